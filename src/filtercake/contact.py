@@ -1,0 +1,85 @@
+"""Closed forms of the Hertz + SJKR contact: what the contact law says before any packing is run.
+
+Every function is in SI units. ``cohesion`` is the cohesion energy density s in J/m3, ``density`` the crystal's.
+Sources: paper eqs. 6-9; SJKR closed forms derived from eq. 6 with area ``A -> 2 pi R* d`` at small overlap.
+"""
+
+from __future__ import annotations
+
+import math
+
+
+def effective_modulus(youngs_modulus: float, poisson_ratio: float) -> float:
+    """Effective Young's modulus E* of two equal materials in contact, Pa: ``E / (2 (1 - nu^2))``."""
+    return youngs_modulus / (2.0 * (1.0 - poisson_ratio**2))
+
+
+def shear_modulus(youngs_modulus: float, poisson_ratio: float) -> float:
+    """Shear modulus G, Pa (paper eq. 9): ``E / (2 (1 + nu))``."""
+    return youngs_modulus / (2.0 * (1.0 + poisson_ratio))
+
+
+def effective_radius(radius_i: float, radius_j: float) -> float:
+    """Effective radius R* of two spheres, m; with ``math.inf`` for a flat wall."""
+    if math.isinf(radius_j):
+        return radius_i
+    return radius_i * radius_j / (radius_i + radius_j)
+
+
+def rayleigh_time_step(radius: float, density: float, youngs_modulus: float, poisson_ratio: float) -> float:
+    """Rayleigh time step of a sphere, s (paper eqs. 7-9).
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the smallest sphere, m.
+    density : float
+        Crystal density, kg/m3.
+    youngs_modulus : float
+        Young's modulus, Pa.
+    poisson_ratio : float
+        Poisson's ratio.
+    """
+    modulus = shear_modulus(youngs_modulus, poisson_ratio)
+    return math.pi * radius * math.sqrt(density / modulus) / (0.1631 * poisson_ratio + 0.8766)
+
+
+def damping_ratio(restitution: float) -> float:
+    """Positive damping coefficient ``-ln e / sqrt(ln^2 e + pi^2)`` of the Hertz model; 0 at e = 1."""
+    log_e = math.log(restitution)
+    return -log_e / math.sqrt(log_e**2 + math.pi**2)
+
+
+def equilibrium_overlap(
+    cohesion: float, youngs_modulus: float, poisson_ratio: float, radius_i: float, radius_j: float
+) -> float:
+    """Overlap at which Hertz repulsion balances SJKR cohesion, m: ``(3 pi s / (2 E*))^2 R*``."""
+    modulus = effective_modulus(youngs_modulus, poisson_ratio)
+    return (1.5 * math.pi * cohesion / modulus) ** 2 * effective_radius(radius_i, radius_j)
+
+
+def relative_overlap(cohesion: float, youngs_modulus: float, poisson_ratio: float) -> float:
+    """Equilibrium overlap of two equal spheres over their diameter, a pure number independent of size."""
+    return equilibrium_overlap(cohesion, youngs_modulus, poisson_ratio, 0.5, 0.5)
+
+
+def pull_off_force(
+    cohesion: float, youngs_modulus: float, poisson_ratio: float, radius_i: float, radius_j: float
+) -> float:
+    """Largest attractive force of a contact, N: ``(2 pi^3 / 3) s^3 R*^2 / E*^2``."""
+    modulus = effective_modulus(youngs_modulus, poisson_ratio)
+    radius = effective_radius(radius_i, radius_j)
+    return 2.0 * math.pi**3 / 3.0 * cohesion**3 * radius**2 / modulus**2
+
+
+def cohesion_at_overlap(relative: float, youngs_modulus: float, poisson_ratio: float) -> float:
+    """Cohesion energy density at which equal spheres overlap by ``relative`` of their diameter, J/m3."""
+    modulus = effective_modulus(youngs_modulus, poisson_ratio)
+    return math.sqrt(relative / 0.25) * modulus / (1.5 * math.pi)
+
+
+def soft_contact_compaction(
+    porosity: float, cohesion: float, youngs_modulus: float, poisson_ratio: float
+) -> float:
+    """Estimated loss of porosity because contacts overlap: ``3 (1 - eps) d_eq / diameter`` (positive)."""
+    return 3.0 * (1.0 - porosity) * relative_overlap(cohesion, youngs_modulus, poisson_ratio)

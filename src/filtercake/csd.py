@@ -1,0 +1,304 @@
+"""Crystal size distributions: classes of (diameter, volume fraction), their moments, and where they come from."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from filtercake.errors import CsdError
+from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, FloatArray, split_header
+
+SUM_TOLERANCE = 0.01
+"""Volume fractions are normalised when their sum is within this of 1; further off is an error."""
+
+
+@dataclass(frozen=True)
+class CrystalSizeDistribution:
+    """A discrete crystal size distribution.
+
+    Attributes
+    ----------
+    size : ndarray, shape (n,)
+        Class diameters in m, ascending and distinct.
+    volume_fraction : ndarray, shape (n,)
+        Volume (= mass) fraction of each class, positive, sum 1.
+    """
+
+    size: FloatArray
+    volume_fraction: FloatArray
+
+    @classmethod
+    def from_classes(cls, size: ArrayLike, volume_fraction: ArrayLike) -> CrystalSizeDistribution:
+        """Build a distribution from classes in any order; equal sizes are merged, empty classes dropped.
+
+        Parameters
+        ----------
+        size : array_like, shape (n,)
+            Diameters, m.
+        volume_fraction : array_like, shape (n,)
+            Volume fractions; normalised if their sum is within 1 % of 1.
+
+        Raises
+        ------
+        CsdError
+            If a size is not positive and finite, a fraction is negative, or the sum is off by more than 1 %.
+        """
+        sizes = np.atleast_1d(np.asarray(size, dtype=np.float64))
+        fractions = np.atleast_1d(np.asarray(volume_fraction, dtype=np.float64))
+        _check_classes(sizes, fractions)
+        keep = fractions > 0.0
+        distinct, where = np.unique(sizes[keep], return_inverse=True)
+        merged = np.bincount(where, weights=fractions[keep])
+        return cls(distinct, merged / merged.sum())
+
+    @cached_property
+    def number_fraction(self) -> FloatArray:
+        """Number fraction of each class, shape (n,), proportional to x/d^3."""
+        number = self.volume_fraction / self.size**3
+        return np.asarray(number / number.sum())
+
+    @property
+    def smallest(self) -> float:
+        """Diameter of the smallest class, m."""
+        return float(self.size[0])
+
+    @property
+    def largest(self) -> float:
+        """Diameter of the largest class, m."""
+        return float(self.size[-1])
+
+    @property
+    def mean_particle_volume(self) -> float:
+        """Number-mean sphere volume, m3."""
+        return float(np.pi / 6.0 * np.sum(self.number_fraction * self.size**3))
+
+    @property
+    def sum_x_over_d2(self) -> float:
+        """Sum of x/d^2 over the classes, 1/m2: the size term of the paper's eq. 3."""
+        return float(np.sum(self.volume_fraction / self.size**2))
+
+    @property
+    def sum_x_over_d(self) -> float:
+        """Sum of x/d over the classes, 1/m: one over the Sauter mean diameter."""
+        return float(np.sum(self.volume_fraction / self.size))
+
+    @property
+    def sauter_mean(self) -> float:
+        """Sauter mean diameter d32, m."""
+        return 1.0 / self.sum_x_over_d
+
+    def mean_size(self, p: int, q: int) -> float:
+        """Moment mean diameter d_pq = (sum n d^p / sum n d^q)^(1/(p-q)), m (d10 number, d43 volume mean).
+
+        Raises
+        ------
+        ValueError
+            If p equals q.
+        """
+        if p == q:
+            raise ValueError("a moment mean needs two different orders p and q")
+        upper = float(np.sum(self.number_fraction * self.size**p))
+        lower = float(np.sum(self.number_fraction * self.size**q))
+        return float((upper / lower) ** (1.0 / (p - q)))
+
+    def class_counts(self, particles: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+        """Whole numbers of spheres per class that add up to ``particles``, by largest remainder, shape (n,)."""
+        ideal = self.number_fraction * particles
+        counts = np.floor(ideal).astype(np.int64)
+        order = np.argsort(-(ideal - counts), kind="stable")
+        counts[order[: particles - int(counts.sum())]] += 1
+        return counts
+
+
+@dataclass(frozen=True)
+class Truncation:
+    """A truncated distribution and the volume it kept.
+
+    Attributes
+    ----------
+    csd : CrystalSizeDistribution
+        The renormalised classes that were kept.
+    kept_volume : float
+        Their share of the full distribution's volume.
+    """
+
+    csd: CrystalSizeDistribution
+    kept_volume: float
+
+
+def truncate(csd: CrystalSizeDistribution, smallest_share: float) -> Truncation:
+    """Drop classes below a volume share and renormalise (paper section 3.1, Fig 5: 0.1 vol%).
+
+    Raises
+    ------
+    CsdError
+        If nothing would be left.
+    """
+    keep = csd.volume_fraction >= smallest_share
+    if not keep.any():
+        raise CsdError(
+            f"truncation at {smallest_share:g} per class leaves no class: the largest class holds "
+            f"{csd.volume_fraction.max():.3g}; lower the truncation below that"
+        )
+    kept = float(csd.volume_fraction[keep].sum())
+    fractions = csd.volume_fraction[keep] / kept
+    return Truncation(CrystalSizeDistribution(csd.size[keep], fractions), kept)
+
+
+def discretise(
+    cumulative_volume: Callable[[FloatArray], FloatArray], upper: float, bin_width: float
+) -> CrystalSizeDistribution:
+    """Cut a continuous distribution into bins of about ``bin_width``, each class at its bin's centre.
+
+    Parameters
+    ----------
+    cumulative_volume : callable
+        Cumulative volume fraction at given diameters (m); shape (n,) to shape (n,).
+    upper : float
+        Largest diameter considered, m.
+    bin_width : float
+        Wanted bin width, m; the width used divides ``upper`` into a whole number of bins (rounded down).
+
+    Raises
+    ------
+    CsdError
+        If there is less than one bin or no volume below ``upper``.
+    """
+    bins = int(upper / bin_width)
+    if bins < 1:
+        raise CsdError(f"a bin width of {bin_width:g} m leaves no bin below {upper:g} m")
+    edges = np.linspace(0.0, upper, bins + 1)
+    volume = np.diff(cumulative_volume(edges))
+    if not volume.sum() > 0.0:
+        raise CsdError(f"the distribution has no volume below {upper:g} m")
+    return CrystalSizeDistribution.from_classes(0.5 * (edges[1:] + edges[:-1]), volume / volume.sum())
+
+
+def read_csd(path: Path) -> CrystalSizeDistribution:
+    """Read a distribution from a CSV with the columns size and volume_fraction and units in the header.
+
+    Parameters
+    ----------
+    path : Path
+        Header such as ``size_um,volume_fraction`` or ``size (mm),volume_fraction (%)``; rows in any order.
+
+    Raises
+    ------
+    CsdError
+        If the file cannot be read, a column or its unit is missing, or the classes are not a distribution.
+    """
+    rows = _read_rows(path)
+    header = [split_header(cell) for cell in rows[0]]
+    size_column, size_factor = _column(path, header, "size", LENGTH_UNITS, default=None)
+    share_column, share_factor = _column(path, header, "volume_fraction", FRACTION_UNITS, default="")
+    try:
+        sizes = [_number(path, line, row, size_column) * size_factor for line, row in enumerate(rows[1:], 2)]
+        shares = [_number(path, line, row, share_column) * share_factor for line, row in enumerate(rows[1:], 2)]
+        return CrystalSizeDistribution.from_classes(sizes, shares)
+    except CsdError as error:
+        message = str(error)
+        raise CsdError(message if message.startswith(str(path)) else f"{path}: {message}") from None
+
+
+def mixture(sizes: Sequence[float], volume_fractions: Sequence[float]) -> CrystalSizeDistribution:
+    """Mix discrete sizes (m) by volume fraction, e.g. the paper's bimodal PMMA."""
+    return CrystalSizeDistribution.from_classes(sizes, volume_fractions)
+
+
+def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> pd.DataFrame:
+    """Tabulate a distribution and its truncation; classes left out of the packing have truncated fractions 0.
+
+    Returns
+    -------
+    DataFrame
+        Columns size_um, volume_fraction, number_fraction, truncated_volume_fraction,
+        truncated_number_fraction; one row per class of the full distribution.
+    """
+    inside = np.isin(full.size, truncated.size)
+    volume, number = np.zeros(full.size.size), np.zeros(full.size.size)
+    volume[inside], number[inside] = truncated.volume_fraction, truncated.number_fraction
+    return pd.DataFrame(
+        {
+            "size_um": full.size / MICROMETRE,
+            "volume_fraction": full.volume_fraction,
+            "number_fraction": full.number_fraction,
+            "truncated_volume_fraction": volume,
+            "truncated_number_fraction": number,
+        }
+    )
+
+
+def from_table(table: pd.DataFrame) -> tuple[CrystalSizeDistribution, CrystalSizeDistribution]:
+    """Read back the full and the truncated distribution from :func:`to_table`'s columns."""
+    size = table["size_um"].to_numpy(np.float64) * MICROMETRE
+    full = CrystalSizeDistribution.from_classes(size, table["volume_fraction"].to_numpy(np.float64))
+    truncated = CrystalSizeDistribution.from_classes(
+        size, table["truncated_volume_fraction"].to_numpy(np.float64)
+    )
+    return full, truncated
+
+
+def _check_classes(sizes: FloatArray, fractions: FloatArray) -> None:
+    if sizes.shape != fractions.shape or sizes.ndim != 1:
+        raise CsdError(f"{sizes.size} sizes but {fractions.size} volume fractions")
+    if sizes.size == 0:
+        raise CsdError("the distribution has no class; give at least one size with its volume fraction")
+    if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):
+        bad = sizes[~(np.isfinite(sizes) & (sizes > 0.0))][0]
+        raise CsdError(f"size {bad / MICROMETRE:g} um: sizes must be positive and finite")
+    if not (np.isfinite(fractions).all() and (fractions >= 0.0).all()):
+        bad = fractions[~(np.isfinite(fractions) & (fractions >= 0.0))][0]
+        raise CsdError(f"volume fraction {bad:g}: fractions must be finite and not negative")
+    total = float(fractions.sum())
+    if abs(total - 1.0) > SUM_TOLERANCE:
+        raise CsdError(f"the volume fractions sum to {total:.6g}; they must sum to 1 within {SUM_TOLERANCE:g}")
+
+
+def _read_rows(path: Path) -> list[list[str]]:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
+    except OSError as error:
+        raise CsdError(f"{path}: cannot be read ({error.strerror})") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise CsdError(f"{path}: is not a UTF-8 CSV file ({error})") from None
+    if len(rows) < 2:
+        raise CsdError(f"{path}: holds no class; the first line names the columns, each further line is a class")
+    return rows
+
+
+def _column(
+    path: Path,
+    header: list[tuple[str, str | None]],
+    name: str,
+    units: dict[str, float],
+    default: str | None,
+) -> tuple[int, float]:
+    """Index of a named column and the factor of its unit."""
+    names = [cell for cell, _ in header]
+    if names.count(name) != 1:
+        raise CsdError(
+            f"{path}: header {names}: needs exactly one column {name!r} (for example size_um,volume_fraction)"
+        )
+    index = names.index(name)
+    unit = header[index][1]
+    unit = default if unit is None else unit
+    if unit is None or unit not in units:
+        known = ", ".join(key for key in units if key)
+        raise CsdError(f"{path}: column {name!r} has unit {unit!r}; name one of {known} in the header")
+    return index, units[unit]
+
+
+def _number(path: Path, line: int, row: list[str], column: int) -> float:
+    text = row[column].strip() if column < len(row) else ""
+    try:
+        return float(text)
+    except ValueError:
+        raise CsdError(f"{path}: line {line}: {text!r} is not a number (use a decimal point)") from None

@@ -1,0 +1,78 @@
+"""Errors a user may meet. Each message says what was wrong, where, and what would be right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class FiltercakeError(Exception):
+    """Base of every error raised on purpose; its text is meant for the user, without a traceback."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with one input.
+
+    Attributes
+    ----------
+    file : str
+        File that holds the value.
+    key : str
+        Path of the key, e.g. ``material.restitution`` or ``sweeps[1].friction[0]``.
+    value : str
+        The offending value as the user wrote it.
+    allowed : str
+        What would be accepted instead.
+    """
+
+    file: str
+    key: str
+    value: str
+    allowed: str
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.key} = {self.value}: {self.allowed}"
+
+
+class ConfigError(FiltercakeError):
+    """The configuration is wrong; holds every problem found, not just the first."""
+
+    def __init__(self, problems: Sequence[Problem]):
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class CsdError(FiltercakeError):
+    """A crystal size distribution is not usable."""
+
+
+class CloudError(FiltercakeError):
+    """The spheres could not be placed without overlap."""
+
+
+class EngineError(FiltercakeError):
+    """The packing engine could not run, or stopped with an error of its own.
+
+    Attributes
+    ----------
+    transient : bool
+        True where the same packing may well succeed when tried again (killed, truncated output, time limit).
+    """
+
+    def __init__(self, message: str, *, transient: bool = False):
+        super().__init__(message)
+        self.transient = transient
+
+
+class EngineMissing(EngineError):  # noqa: N818 - reads better than EngineMissingError where it is caught
+    """The engine asked for is not installed on this machine."""
+
+
+class PackingRejected(FiltercakeError):  # noqa: N818
+    """A packing ran but is not acceptable; the text lists every reason."""
+
+    def __init__(self, reasons: Sequence[str], *, transient: bool = False):
+        self.reasons = tuple(reasons)
+        self.transient = transient
+        super().__init__("; ".join(self.reasons))

@@ -1,0 +1,66 @@
+"""What every packing engine offers and what it is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from filtercake.csd import CrystalSizeDistribution
+from filtercake.packing.cloud import Cloud
+from filtercake.packing.result import SettledState
+from filtercake.packing.settling import StopRule
+from filtercake.packing.spec import PackingSpec
+
+Progress = Callable[[str], None]
+"""Takes one short line about how far a long packing is."""
+
+
+@dataclass(frozen=True)
+class SettleRequest:
+    """One packing to be made.
+
+    Attributes
+    ----------
+    spec : PackingSpec
+        Material, time step and protocol.
+    csd : CrystalSizeDistribution
+        The truncated distribution (for engines that insert spheres themselves).
+    cloud : Cloud
+        The initial cloud.
+    rule : StopRule
+        When the bed is at rest.
+    seed : int
+        For whatever the engine draws itself.
+    folder : Path
+        Private scratch folder, empty.
+    progress : callable
+        Called now and then with a line about a long packing.
+    """
+
+    spec: PackingSpec
+    csd: CrystalSizeDistribution
+    cloud: Cloud
+    rule: StopRule
+    seed: int
+    folder: Path
+    progress: Progress
+
+
+class Engine(Protocol):
+    """A packing engine."""
+
+    name: str
+
+    def why_missing(self) -> str | None:
+        """Say why the engine cannot run on this machine, None where it can."""
+
+    def settle(self, request: SettleRequest) -> SettledState:
+        """Let the cloud settle.
+
+        Raises
+        ------
+        EngineError
+            If the engine stops with an error; the text holds the engine's own words.
+        """

@@ -1,0 +1,291 @@
+"""LIGGGHTS as a packing engine: the tuned deck, its files, and its own words when something is wrong."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from filtercake.errors import EngineError, EngineMissing
+from filtercake.packing.cloud import Cloud
+from filtercake.packing.engines import micro, process
+from filtercake.packing.engines.base import SettleRequest
+from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
+from filtercake.packing.result import SettledState
+from filtercake.packing.spec import PackingSpec
+from filtercake.units import GRAVITY, FloatArray
+
+EXECUTABLE_VARIABLE = "FILTERCAKE_LIGGGHTS"
+EXECUTABLES = ("liggghts", "lmp_auto", "lmp_liggghts")
+TEMPLATE_FOLDER_VARIABLE = "FILTERCAKE_TEMPLATES"
+PARTICLES_PER_PROCESS = 20_000
+"""Beds smaller than this run on one process; below it MPI costs more than it gives."""
+PROGRESS_SECONDS = 20.0
+
+_COLUMNS = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
+
+
+def template_folder() -> Path:
+    """Folder of the deck templates: the checkout's ``liggghts_templates``, or the one an environment variable names."""
+    named = os.environ.get(TEMPLATE_FOLDER_VARIABLE)
+    return Path(named) if named else Path(__file__).resolve().parents[4] / "liggghts_templates"
+
+
+def find_executable() -> str | None:
+    """Path of the LIGGGHTS executable, None where there is none."""
+    named = os.environ.get(EXECUTABLE_VARIABLE)
+    if named:
+        return shutil.which(named)
+    return next((path for path in map(shutil.which, EXECUTABLES) if path), None)
+
+
+class Liggghts:
+    """LIGGGHTS with the tuned deck: shared cloud, tight box, small skin, only what the scene needs, early stop."""
+
+    name = "liggghts"
+    template = "packing.in.j2"
+
+    def __init__(self, *, force_tangential: bool = False):
+        """Create the engine; ``force_tangential`` keeps the tangential part at mu = 0 (to prove it does nothing)."""
+        self.force_tangential = force_tangential
+
+    def why_missing(self) -> str | None:
+        """Say why LIGGGHTS cannot run here, None where it can."""
+        if find_executable() is not None:
+            return None
+        named = os.environ.get(EXECUTABLE_VARIABLE)
+        if named:
+            return f"LIGGGHTS is not at {named} (named by {EXECUTABLE_VARIABLE})"
+        return (
+            "LIGGGHTS is not installed (no `liggghts` on the PATH): on Debian, `sudo apt-get install liggghts`, "
+            f"or set {EXECUTABLE_VARIABLE} to the executable"
+        )
+
+    def settle(self, request: SettleRequest) -> SettledState:
+        """Run LIGGGHTS on the request's cloud (see :class:`filtercake.packing.engines.base.Engine`)."""
+        write_cloud(request.cloud, request.spec.density, request.folder / "cloud.data")
+        return self._run(request, self._deck_values(request), expected=request.cloud.radius.size)
+
+    def _deck_values(self, request: SettleRequest) -> dict[str, Any]:
+        spec, rule = request.spec, request.rule
+        return {
+            **_material_values(spec),
+            "contact_model": contact_model(spec.friction > 0.0 or self.force_tangential, spec.cohesion > 0.0),
+            "tangential": spec.friction > 0.0 or self.force_tangential,
+            "cloud_file": "cloud.data",
+            "length": micro.number(request.cloud.length / micro.LENGTH),
+            "skin": micro.number((spec.skin or default_skin(request.cloud)) / micro.LENGTH),
+            "check_steps": rule.check_steps,
+            "max_checks": rule.max_checks,
+            "calm_checks": rule.calm_checks,
+            "height_tolerance": micro.number(rule.height_tolerance),
+            "energy_fraction": micro.number(rule.energy_fraction),
+            "write_vtk": spec.write_vtk,
+        }
+
+    def _run(self, request: SettleRequest, values: dict[str, Any], expected: int | None) -> SettledState:
+        """Render the deck, run it, and read the outcome."""
+        folder, spec = request.folder, request.spec
+        (folder / "packing.in").write_text(render(self.template, values), encoding="utf-8")
+        screen = folder / "screen.log"
+        started = time.monotonic()
+        status = process.run(
+            command(processes(spec)), folder, screen, spec.time_limit, _Watcher(screen, request)
+        )
+        wall_time = time.monotonic() - started
+        log = parse_log(screen.read_text(encoding="utf-8", errors="replace"))
+        check_end(status, log)
+        position, velocity, radius = read_dump(folder / "final.dump")
+        length = request.cloud.length
+        position[:, :2] %= length
+        return SettledState(
+            position=position,
+            velocity=velocity,
+            radius=radius,
+            length=length,
+            trajectory=trajectory(log, spec.time_step, length, spec.density),
+            steps=log.finished_step or 0,
+            expected=expected if expected is not None else (log.inserted or 0),
+            dangerous_builds=log.dangerous_builds,
+            engine=self.name,
+            engine_version=log.version,
+            warnings=log.warnings,
+            wall_time=wall_time,
+        )
+
+
+class _Watcher:
+    """Reads the growing screen output and reports how far a long packing is."""
+
+    def __init__(self, screen: Path, request: SettleRequest):
+        self.screen, self.request = screen, request
+        self.reported = time.monotonic()
+
+    def __call__(self) -> None:
+        if time.monotonic() - self.reported < PROGRESS_SECONDS:
+            return
+        self.reported = time.monotonic()
+        with self.screen.open("rb") as stream:
+            stream.seek(0, os.SEEK_END)
+            stream.seek(max(0, stream.tell() - 4096))
+            tail = parse_log(stream.read().decode("utf-8", "replace"))
+        if tail.states.size:
+            step, height = int(tail.states[-1, 0]), tail.states[-1, 1]
+            self.request.progress(f"step {step:,}, mean height of the spheres {height:.1f} um")
+
+
+@cache
+def _environment(folder: str) -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folder),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render(template: str, values: dict[str, Any]) -> str:
+    """Fill a deck template.
+
+    Raises
+    ------
+    EngineError
+        If the template is missing or asks for a value that is not given.
+    """
+    folder = template_folder()
+    try:
+        return _environment(str(folder)).get_template(template).render(values)
+    except jinja2.TemplateNotFound:
+        raise EngineError(f"deck template {folder / template} does not exist") from None
+    except jinja2.TemplateError as error:
+        raise EngineError(f"deck template {folder / template}: {error}") from None
+
+
+def contact_model(tangential: bool, cohesive: bool) -> str:
+    """LIGGGHTS's words for the contact law; mu = 0 makes the tangential part exactly nothing, so it is left out."""
+    return (
+        "model hertz" + (" tangential history" if tangential else "") + (" cohesion sjkr" if cohesive else "")
+    )
+
+
+def default_skin(cloud: Cloud) -> float:
+    """Neighbour skin, m: 15 % of the smallest diameter keeps the pair list near the real contacts."""
+    return 0.3 * float(cloud.radius.min())
+
+
+def processes(spec: PackingSpec) -> int:
+    """MPI processes of a packing: one below ``PARTICLES_PER_PROCESS`` spheres, else two, unless the spec says."""
+    if spec.processes > 0:
+        return spec.processes
+    return 2 if spec.particles >= 2 * PARTICLES_PER_PROCESS else 1
+
+
+def command(process_count: int) -> list[str]:
+    """Command line; output unbuffered and echoed, or an input error's message is lost in MPI_Abort."""
+    executable = find_executable()
+    if executable is None:
+        raise EngineMissing(Liggghts().why_missing() or "LIGGGHTS is missing")
+    launcher: list[str] = []
+    if process_count > 1:
+        launcher = ["mpirun", "-np", str(process_count), "--oversubscribe", "--bind-to", "none"]
+        if os.geteuid() == 0:
+            launcher.append("--allow-run-as-root")
+    return [*launcher, "stdbuf", "-o0", executable, "-echo", "screen", "-log", "none", "-in", "packing.in"]
+
+
+def write_cloud(cloud: Cloud, density: float, path: Path) -> None:
+    """Write a cloud as a LIGGGHTS data file in micro units, in a box just high enough for it."""
+    margin = float(cloud.radius.max())
+    lo, hi = micro.number(-margin / micro.LENGTH), micro.number((cloud.height + margin) / micro.LENGTH)
+    side = micro.number(cloud.length / micro.LENGTH)
+    header = (
+        f"initial cloud, units micro\n\n{cloud.radius.size} atoms\n1 atom types\n\n"
+        f"0 {side} xlo xhi\n0 {side} ylo yhi\n{lo} {hi} zlo zhi\n\nAtoms\n\n"
+    )
+    n = cloud.radius.size
+    rows = np.column_stack(
+        [
+            np.arange(1, n + 1),
+            np.ones(n),
+            2.0 * cloud.radius / micro.LENGTH,
+            np.full(n, density / micro.DENSITY),
+            cloud.position / micro.LENGTH,
+        ]
+    )
+    with path.open("w", encoding="ascii") as stream:
+        stream.write(header)
+        np.savetxt(stream, rows, fmt=["%d", "%d", "%.17g", "%.17g", "%.17g", "%.17g", "%.17g"])
+
+
+def read_dump(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Read the final dump: positions (n, 3) m, velocities (n, 3) m/s, radii (n,) m, sorted by atom number.
+
+    Raises
+    ------
+    EngineError
+        If the dump is missing, empty, cut short, or not the table the deck asks for (transient: try again).
+    """
+    try:
+        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError as error:
+        raise EngineError(f"the final dump cannot be read: {error.strerror}", transient=True) from None
+    start = next((k for k, line in enumerate(lines) if line.startswith("ITEM: ATOMS")), None)
+    if start is None or len(lines) < 5 or tuple(lines[start].split()[2:]) != _COLUMNS:
+        raise EngineError("the final dump is empty or cut short (no atom table)", transient=True)
+    try:
+        promised = int(lines[lines.index("ITEM: NUMBER OF ATOMS") + 1])
+        table = np.array([line.split() for line in lines[start + 1 :]], dtype=np.float64)
+    except ValueError:
+        raise EngineError("the final dump is cut short or garbled in a row", transient=True) from None
+    if table.shape != (promised, len(_COLUMNS)):
+        raise EngineError(f"the final dump promises {promised} atoms but holds {len(table)}", transient=True)
+    table = table[np.argsort(table[:, 0])]
+    return table[:, 2:5] * micro.LENGTH, table[:, 5:8] * micro.VELOCITY, table[:, 8] * micro.LENGTH
+
+
+def check_end(status: int, log: LiggghtsLog) -> None:
+    """Raise unless LIGGGHTS ended well: exit status 0, end marker, and no forced end.
+
+    LIGGGHTS answers SIGTERM and a full disk with exit status 0; an input error only shows in its output.
+
+    Raises
+    ------
+    EngineError
+        In LIGGGHTS's own words where it has any.
+    """
+    if log.error is not None:
+        raise EngineError(f"LIGGGHTS: {log.error}")
+    if status < 0:
+        raise EngineError(f"LIGGGHTS was killed by signal {-status}", transient=True)
+    if log.forced_end:
+        raise EngineError("LIGGGHTS was asked to stop by a signal before the bed was at rest", transient=True)
+    if status != 0:
+        raise EngineError(f"LIGGGHTS ended with status {status}; its last line: {log.last_line!r}", transient=True)
+    if log.finished_step is None:
+        raise EngineError(
+            f"LIGGGHTS ended before its deck did (stopped, or disk full); its last line: {log.last_line!r}",
+            transient=True,
+        )
+
+
+def _material_values(spec: PackingSpec) -> dict[str, Any]:
+    return {
+        "engine_seed": spec.seed,
+        "youngs_modulus": micro.number(spec.youngs_modulus / micro.PRESSURE),
+        "poisson_ratio": micro.number(spec.poisson_ratio),
+        "restitution": micro.number(spec.restitution),
+        "friction": micro.number(spec.friction),
+        "cohesion": micro.number(spec.cohesion / micro.PRESSURE),
+        "cohesive": spec.cohesion > 0.0,
+        "density": micro.number(spec.density / micro.DENSITY),
+        "gravity": micro.number(GRAVITY / micro.ACCELERATION),
+        "time_step": micro.number(spec.time_step / micro.TIME),
+        "settling_velocity": micro.number(spec.settling_velocity / micro.VELOCITY),
+    }

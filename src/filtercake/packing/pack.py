@@ -1,0 +1,228 @@
+"""Make packings: cloud, settling, acceptance; and all replicates of a point, without redoing finished ones."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from filtercake.csd import CrystalSizeDistribution
+from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
+from filtercake.packing.accept import accept
+from filtercake.packing.cloud import make_cloud
+from filtercake.packing.engines import Engine, SettleRequest, get_engine
+from filtercake.packing.result import Packing, read_record, sha256, write_json
+from filtercake.packing.settling import StopRule
+from filtercake.packing.spec import PackingSpec, digest, stage_seed
+
+ATTEMPTS = 3
+"""Times a packing is tried when it fails for a reason that may pass (killed, output cut short)."""
+MANIFEST = "replicates.json"
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one replicate.
+
+    Attributes
+    ----------
+    replicate : int
+        Number of the replicate, from 0.
+    status : {"ok", "failed"}
+        Whether there is an accepted packing.
+    reason : str
+        Why not; empty where there is one.
+    seed : int
+        Seed of the initial cloud.
+    sha256 : str
+        Checksum of the geometry file; empty where there is none.
+    attempts : int
+        How often it was tried.
+    """
+
+    replicate: int
+    status: str
+    reason: str
+    seed: int
+    sha256: str
+    attempts: int
+
+
+def cloud_seed(spec: PackingSpec, csd: CrystalSizeDistribution, replicate: int) -> int:
+    """Seed of a replicate's cloud.
+
+    It follows from what the cloud is made of, not from friction, cohesion or engine: common random numbers
+    make the differences between those sharp.
+    """
+    classes = [[f"{size:.12e}" for size in csd.size], [f"{x:.12e}" for x in csd.volume_fraction]]
+    return stage_seed(spec.seed, classes, spec.particles, spec.void_fraction, replicate, "cloud")
+
+
+def pack(
+    spec: PackingSpec,
+    csd: CrystalSizeDistribution,
+    replicate: int,
+    folder: Path,
+    *,
+    engine: Engine | None = None,
+    progress: Report = lambda _: None,
+) -> Packing:
+    """Make one packing.
+
+    Parameters
+    ----------
+    spec : PackingSpec
+        Material, time step, protocol.
+    csd : CrystalSizeDistribution
+        The truncated distribution.
+    replicate : int
+        Number of the replicate; decides the seed.
+    folder : Path
+        Empty scratch folder for the engine's files.
+    engine : Engine, optional
+        Used instead of the one the spec names.
+    progress : callable
+        Takes a line about a long packing.
+
+    Raises
+    ------
+    CloudError, EngineError, PackingRejected
+        If the spheres cannot be placed, the engine fails, or its result is not acceptable.
+    """
+    seed = cloud_seed(spec, csd, replicate)
+    cloud = make_cloud(csd, spec.particles, spec.void_fraction, seed)
+    rule = StopRule.for_bed(spec, cloud.length)
+    engine_seed = stage_seed(seed, "engine")
+    request = SettleRequest(spec, csd, cloud, rule, engine_seed, folder, progress)
+    state = (engine or get_engine(spec.engine)).settle(request)
+    measured = accept(state, spec, cloud, rule)
+    diagnostics = {
+        **measured,
+        "replicate": replicate,
+        "seed": seed,
+        "rayleigh_fraction": spec.rayleigh_fraction(csd.smallest),
+        "spec": spec.as_dict(),
+    }
+    return Packing(state.position, state.radius, state.length, diagnostics)
+
+
+def pack_replicates(
+    spec: PackingSpec,
+    csd: CrystalSizeDistribution,
+    replicates: int,
+    folder: Path,
+    code: str,
+    report: Callable[[Outcome, dict[str, Any]], None] = lambda _outcome, _record: None,
+    progress: Report = lambda _: None,
+) -> list[Outcome]:
+    """Make a point's replicates in ``folder`` and write their manifest last.
+
+    Finished replicates are kept when the same point is run again, unless the spec, the distribution or the
+    code changed; a packing that fails is an outcome with a reason, not an error.
+
+    Parameters
+    ----------
+    spec, csd
+        As for :func:`pack`.
+    replicates : int
+        How many.
+    folder : Path
+        Receives r<k>.npz, r<k>.json and the manifest.
+    code : str
+        Hash of the code and decks behind the packing.
+    report : callable
+        Called with every outcome and its record as it comes.
+    progress : callable
+        Takes a line about a long packing.
+
+    Raises
+    ------
+    EngineMissing
+        If the engine is not installed: no replicate could be made.
+    """
+    key = digest(code, spec.as_dict(), csd.size.tolist(), csd.volume_fraction.tolist())
+    engine = get_engine(spec.engine)
+    work = folder / ".work"
+    shutil.rmtree(work, ignore_errors=True)
+    outcomes = []
+    for replicate in range(replicates):
+        npz = folder / f"r{replicate}.npz"
+        outcome, record = finished(npz, key, replicate) or (None, {})
+        if outcome is None:
+            outcome, record = _attempt(spec, csd, replicate, npz, key, engine, work, progress)
+        report(outcome, record)
+        outcomes.append(outcome)
+    shutil.rmtree(work, ignore_errors=True)
+    write_json(folder / MANIFEST, {"key": key, "replicates": [vars(outcome) for outcome in outcomes]})
+    return outcomes
+
+
+def finished(npz: Path, key: str, replicate: int) -> tuple[Outcome, dict[str, Any]] | None:
+    """Outcome and record of a replicate that was made before from the same inputs and is still whole."""
+    try:
+        record = read_record(npz.with_suffix(".json"))
+        if record.get("key") != key or record.get("sha256") != sha256(npz):
+            return None
+    except (PackingRejected, OSError):
+        return None
+    outcome = Outcome(replicate, "ok", "", record["seed"], record["sha256"], record["attempts"])
+    return outcome, record
+
+
+def _attempt(
+    spec: PackingSpec,
+    csd: CrystalSizeDistribution,
+    replicate: int,
+    npz: Path,
+    key: str,
+    engine: Engine,
+    work: Path,
+    progress: Report,
+) -> tuple[Outcome, dict[str, Any]]:
+    seed = cloud_seed(spec, csd, replicate)
+    for attempt in range(1, ATTEMPTS + 1):
+        scratch = work / f"r{replicate}"
+        shutil.rmtree(scratch, ignore_errors=True)
+        scratch.mkdir(parents=True)
+        try:
+            made = pack(spec, csd, replicate, scratch, engine=engine, progress=progress)
+        except EngineMissing:
+            raise
+        except (CloudError, EngineError, PackingRejected) as error:
+            if getattr(error, "transient", False) and attempt < ATTEMPTS:
+                progress(f"replicate {replicate}: {error}; trying again")
+                continue
+            _keep_evidence(scratch, npz)
+            return Outcome(replicate, "failed", str(error), seed, "", attempt), {}
+        record = {**made.diagnostics, "key": key, "attempts": attempt}
+        checksum = Packing(made.position, made.radius, made.length, record).save(npz)
+        _keep_pictures(scratch, npz)
+        return Outcome(replicate, "ok", "", seed, checksum, attempt), record
+    raise AssertionError("unreachable")
+
+
+def _keep_evidence(scratch: Path, npz: Path) -> None:
+    """Keep the deck and the engine's output of a failed packing; drop what an earlier run left for it."""
+    kept = npz.with_suffix(".failed")
+    shutil.rmtree(kept, ignore_errors=True)
+    kept.mkdir(parents=True)
+    for name in ("packing.in", "cloud.data", "screen.log"):
+        if (scratch / name).exists():
+            shutil.move(scratch / name, kept / name)
+    npz.unlink(missing_ok=True)
+    npz.with_suffix(".json").unlink(missing_ok=True)
+
+
+def _keep_pictures(scratch: Path, npz: Path) -> None:
+    shutil.rmtree(npz.with_suffix(".failed"), ignore_errors=True)
+    pictures = sorted(scratch.glob("*.vtk"))
+    if pictures:
+        folder = npz.with_suffix(".vtk")
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        for picture in pictures:
+            shutil.move(picture, folder / picture.name)

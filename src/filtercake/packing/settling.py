@@ -1,0 +1,113 @@
+"""When a settling bed is at rest: one rule, evaluated the same way whatever the engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from filtercake.packing.cloud import PLACEMENT_HEIGHT
+from filtercake.packing.spec import PackingSpec
+from filtercake.units import FloatArray
+
+CHECKS_PER_FALL = 40
+"""Checks of the stop rule during one free-fall time of the highest sphere."""
+CALM_CHECKS = 2
+"""Checks on end that must find the bed at rest."""
+ENERGY_FRACTION = 1e-3
+"""The kinetic energy must have fallen below this share of its peak."""
+TYPICAL_SOLIDS = 0.65
+"""Solids fraction used to turn a tolerance on porosity into one on the bed's mean height."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What the stop rule saw, one entry per check; arrays of shape (m,).
+
+    Attributes
+    ----------
+    time : ndarray
+        Physical time since release, s.
+    mean_height : ndarray
+        Height of the spheres' centre of mass, m.
+    kinetic_energy : ndarray
+        Translational kinetic energy of all spheres, J.
+    porosity_sample : ndarray
+        Porosity of the paper's sample region (centres in 0..L counted whole).
+    """
+
+    time: FloatArray
+    mean_height: FloatArray
+    kinetic_energy: FloatArray
+    porosity_sample: FloatArray
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """The bed is at rest when its mean height and its kinetic energy have both stopped falling.
+
+    The mean height z of a bed of solids fraction 1-eps obeys d eps = (1-eps) dz/z, so that a tolerance on
+    porosity is one on height, which is free of the counting noise of a sample region.
+
+    Attributes
+    ----------
+    check_steps : int
+        Time steps between checks.
+    max_checks : int
+        Checks after which the bed counts as unsettled.
+    height_tolerance : float
+        Largest relative change of the mean height between checks.
+    energy_fraction : float
+        Largest kinetic energy over its peak.
+    calm_checks : int
+        Checks on end that must pass.
+    """
+
+    check_steps: int
+    max_checks: int
+    height_tolerance: float
+    energy_fraction: float = ENERGY_FRACTION
+    calm_checks: int = CALM_CHECKS
+
+    @classmethod
+    def for_bed(cls, spec: PackingSpec, length: float) -> StopRule:
+        """Scale the rule to a box of side ``length`` (m)."""
+        fall_time = spec.free_fall_time(PLACEMENT_HEIGHT * length)
+        check_steps = max(1, round(fall_time / CHECKS_PER_FALL / spec.time_step))
+        return cls(
+            check_steps=check_steps,
+            max_checks=max(CALM_CHECKS, round(CHECKS_PER_FALL * spec.max_fall_times)),
+            height_tolerance=spec.porosity_tolerance / TYPICAL_SOLIDS,
+        )
+
+    def is_calm(self, before: float, after: float, energy: float, peak_energy: float) -> bool:
+        """Whether one check finds the bed at rest; ``before`` and ``after`` are mean heights."""
+        fallen = abs(before - after) / after
+        return fallen < self.height_tolerance and energy < self.energy_fraction * peak_energy
+
+    def settled_at(self, trajectory: Trajectory) -> int | None:
+        """Index of the check at which the rule held, or None.
+
+        The engine decides when to stop; this repeats its decision from the record, so that an engine that
+        stopped for another reason is found out.
+        """
+        peak, calm = 0.0, 0
+        for k in range(1, trajectory.time.size):
+            energy = float(trajectory.kinetic_energy[k])
+            peak = max(peak, energy)
+            before, after = float(trajectory.mean_height[k - 1]), float(trajectory.mean_height[k])
+            calm = calm + 1 if self.is_calm(before, after, energy, peak) else 0
+            if calm >= self.calm_checks:
+                return k
+        return None
+
+
+def stopped_falling(trajectory: Trajectory, porosity_tolerance: float, last_share: float = 0.1) -> bool:
+    """Whether the sample porosity changed by less than a tolerance over the last part of a fixed-length run.
+
+    The paper's own criterion (Fig 3), used for the as-published protocol, which runs a fixed number of steps.
+    """
+    count = max(2, int(trajectory.time.size * last_share))
+    height = trajectory.mean_height[-count:]
+    fallen = float(np.ptp(height)) / float(height[-1]) * TYPICAL_SOLIDS
+    return fallen < porosity_tolerance

@@ -1,0 +1,55 @@
+"""Named units a user meets, as SI factors, and the helpers that read them from column headers."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MICROMETRE: Final = 1e-6
+MINUTE: Final = 60.0
+KILOJOULE_PER_M3: Final = 1e3
+MEGAPASCAL: Final = 1e6
+GRAVITY: Final = 9.81
+"""Gravitational acceleration, m/s2 (physical constant used by the paper's script)."""
+
+LENGTH_UNITS: Final[dict[str, float]] = {
+    "m": 1.0,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "µm": 1e-6,  # micro sign U+00B5
+    "μm": 1e-6,  # Greek mu U+03BC
+    "micron": 1e-6,
+    "nm": 1e-9,
+}
+FRACTION_UNITS: Final[dict[str, float]] = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01, "percent": 0.01}
+
+_HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<bracket>[^\])]*)\s*[\])])?\s*$")
+
+
+def split_header(header: str) -> tuple[str, str | None]:
+    """Split a column header into its name and unit.
+
+    Parameters
+    ----------
+    header : str
+        For example ``size_um``, ``size (um)``, ``size [mm]`` or ``volume_fraction``.
+
+    Returns
+    -------
+    tuple of str and (str or None)
+        The bare name in lower case and the unit, None where the header states none.
+    """
+    match = _HEADER.match(header)
+    name, unit = (match["name"], match["bracket"]) if match else (header, None)
+    name = name.strip().lower().replace(" ", "_")
+    if unit is None and "_" in name:
+        stem, last = name.rsplit("_", 1)
+        if last in LENGTH_UNITS or last in ("percent", "%"):
+            return stem, last
+    return name, unit.strip() if unit is not None else None
