@@ -78,8 +78,6 @@ def cohesion_at_overlap(relative: float, youngs_modulus: float, poisson_ratio: f
     return math.sqrt(relative / 0.25) * modulus / (1.5 * math.pi)
 
 
-def soft_contact_compaction(
-    porosity: float, cohesion: float, youngs_modulus: float, poisson_ratio: float
-) -> float:
+def soft_contact_compaction(porosity: float, cohesion: float, youngs_modulus: float, poisson_ratio: float) -> float:
     """Estimated loss of porosity because contacts overlap: ``3 (1 - eps) d_eq / diameter`` (positive)."""
     return 3.0 * (1.0 - porosity) * relative_overlap(cohesion, youngs_modulus, poisson_ratio)

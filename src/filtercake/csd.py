@@ -239,9 +239,7 @@ def from_table(table: pd.DataFrame) -> tuple[CrystalSizeDistribution, CrystalSiz
     """Read back the full and the truncated distribution from :func:`to_table`'s columns."""
     size = table["size_um"].to_numpy(np.float64) * MICROMETRE
     full = CrystalSizeDistribution.from_classes(size, table["volume_fraction"].to_numpy(np.float64))
-    truncated = CrystalSizeDistribution.from_classes(
-        size, table["truncated_volume_fraction"].to_numpy(np.float64)
-    )
+    truncated = CrystalSizeDistribution.from_classes(size, table["truncated_volume_fraction"].to_numpy(np.float64))
     return full, truncated
 
 

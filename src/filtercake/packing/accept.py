@@ -155,5 +155,5 @@ def _deepest(state: SettledState, contacts: Contacts) -> float:
 
 
 def _keeps_the_rule(state: SettledState) -> bool:
-    """The as-published protocol draws its own spheres and runs a fixed number of steps."""
+    """Whether the engine starts from the cloud and stops by the rule; the as-published protocol does neither."""
     return state.engine != "liggghts_as_published"

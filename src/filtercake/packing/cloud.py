@@ -133,7 +133,7 @@ def _grid_levels(radius: FloatArray, length: float, height: float) -> tuple[IntA
     return level, cells
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _place(
     position: FloatArray,
     radius: FloatArray,
@@ -172,15 +172,15 @@ def _place(
     return n
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _cell(x: float, y: float, z: float, height: float, cells: IntArray) -> int:
     cx = min(int(x * cells[0]), cells[0] - 1)
     cy = min(int(y * cells[1]), cells[1] - 1)
     cz = min(int(z / height * cells[2]), cells[2] - 1)
-    return (cz * cells[1] + cy) * cells[0] + cx  # type: ignore[no-any-return]
+    return int((cz * cells[1] + cy) * cells[0] + cx)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _is_free(
     x: float,
     y: float,

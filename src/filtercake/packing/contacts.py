@@ -44,7 +44,7 @@ def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Co
     wrapped[:, :2] %= length
     wrapped[:, :2][wrapped[:, :2] >= length] = 0.0
     wrapped[:, 2] -= wrapped[:, 2].min()
-    box = [length, length, 0.0]
+    box = np.array([length, length, 0.0])
     level = np.floor(np.log2(radius.max() / radius)).astype(np.int64)
     members = [np.flatnonzero(level == k) for k in np.unique(level)]
     trees = [cKDTree(wrapped[m], boxsize=box) for m in members]

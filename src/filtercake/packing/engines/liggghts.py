@@ -95,9 +95,7 @@ class Liggghts:
         (folder / "packing.in").write_text(render(self.template, values), encoding="utf-8")
         screen = folder / "screen.log"
         started = time.monotonic()
-        status = process.run(
-            command(processes(spec)), folder, screen, spec.time_limit, _Watcher(screen, request)
-        )
+        status = process.run(command(processes(spec)), folder, screen, spec.time_limit, _Watcher(screen, request))
         wall_time = time.monotonic() - started
         log = parse_log(screen.read_text(encoding="utf-8", errors="replace"))
         check_end(status, log)
@@ -170,9 +168,7 @@ def render(template: str, values: dict[str, Any]) -> str:
 
 def contact_model(tangential: bool, cohesive: bool) -> str:
     """LIGGGHTS's words for the contact law; mu = 0 makes the tangential part exactly nothing, so it is left out."""
-    return (
-        "model hertz" + (" tangential history" if tangential else "") + (" cohesion sjkr" if cohesive else "")
-    )
+    return "model hertz" + (" tangential history" if tangential else "") + (" cohesion sjkr" if cohesive else "")
 
 
 def default_skin(cloud: Cloud) -> float:

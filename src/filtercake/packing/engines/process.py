@@ -63,7 +63,7 @@ def run(
                 stderr=subprocess.STDOUT,
                 env=environment,
                 start_new_session=True,
-                preexec_fn=_die_with_parent if sys.platform == "linux" else None,  # noqa: PLW1509 - no threads here
+                preexec_fn=_die_with_parent if sys.platform == "linux" else None,
             )
         except OSError as error:
             raise EngineError(f"{command[0]} cannot be started: {error.strerror}") from None
@@ -73,9 +73,7 @@ def run(
             _kill_group(process)
 
 
-def _wait(
-    process: subprocess.Popen[bytes], time_limit: float, on_poll: Callable[[], None] | None
-) -> int:
+def _wait(process: subprocess.Popen[bytes], time_limit: float, on_poll: Callable[[], None] | None) -> int:
     deadline = time.monotonic() + time_limit if time_limit > 0.0 else None
     while True:
         try:

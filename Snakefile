@@ -1,0 +1,35 @@
+# filtercake: porosity and resistance of filter cakes over a parameter study.
+# Everything a user sets is in config/; what the rules call is in src/filtercake/.
+from snakemake.utils import min_version
+
+min_version("9.20")
+
+
+configfile: "config/config.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/csd.smk"
+include: "workflow/rules/packing.smk"
+include: "workflow/rules/resistance.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/benchmark.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        expand("{results}/{study}/provenance.json", results=RESULTS, study=STUDIES),
+    localrule: True
+
+
+onstart:
+    begin_run()
+
+
+onsuccess:
+    report_success()
+
+
+onerror:
+    report_failure(log)

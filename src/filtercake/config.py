@@ -1,0 +1,214 @@
+"""The typed model of a study and of the workflow's configuration.
+
+The one source of defaults, ranges, units and descriptions: the JSON schemas, the template of a study and the
+reference of its keys are generated from it.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+LARGEST_RELATIVE_OVERLAP = 0.035
+"""Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
+DOUBTFUL_RELATIVE_OVERLAP = 0.01
+"""Contacts overlap by more than this share of the diameter: warned."""
+
+NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")
+"""What a study or a distribution may be called: it names files and folders."""
+
+
+def _number(value: Any) -> Any:
+    """Accept what YAML 1.1 reads as text (1e5, 5e-1); refuse booleans."""
+    if isinstance(value, bool):
+        raise ValueError("must be a number, not true/false")
+    if isinstance(value, str):
+        try:
+            return float(value)
+        except ValueError:
+            raise ValueError("must be a number (with a decimal point)") from None
+    return value
+
+
+def _whole(value: Any) -> Any:
+    value = _number(value)
+    if isinstance(value, float):
+        if value != int(value):
+            raise ValueError("must be a whole number")
+        return int(value)
+    return value
+
+
+def _listed(value: Any) -> Any:
+    return value if isinstance(value, list) else [value]
+
+
+def _name(value: Any) -> Any:
+    if not isinstance(value, str) or not NAME.match(value):
+        raise ValueError("must be letters, digits, - and _, starting with a letter or digit, at most 64 long")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
+Whole = Annotated[int, BeforeValidator(_whole)]
+Name = Annotated[str, BeforeValidator(_name)]
+
+Density = Annotated[Number, Field(gt=0, le=25_000)]
+YoungsModulus = Annotated[Number, Field(ge=0.5, le=100_000)]
+PoissonRatio = Annotated[Number, Field(ge=0, lt=0.5)]
+Restitution = Annotated[Number, Field(gt=0, lt=1)]
+Friction = Annotated[Number, Field(ge=0, le=2)]
+Cohesion = Annotated[Number, Field(ge=0)]
+
+EngineName = Literal["auto", "liggghts", "liggghts_as_published"]
+
+
+class Model(BaseModel):
+    """Base of all parts: unknown keys are errors, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SizeClass(Model):
+    """One size of a mixture."""
+
+    size_um: Annotated[Number, Field(gt=0, le=100_000, description="Crystal diameter, um.")]
+    volume_fraction: Annotated[Number, Field(gt=0, le=1, description="Its share of the crystal volume (= mass).")]
+
+
+class Csd(Model):
+    """A crystal size distribution: a mixture of discrete sizes, or a CSV file."""
+
+    label: Annotated[str, Field(max_length=60)] | None = Field(
+        default=None, description="Name in figures and tables; the key if left out."
+    )
+    mixture: Annotated[list[SizeClass], Field(min_length=1)] | None = Field(
+        default=None, description="Discrete sizes with their volume fractions."
+    )
+    file: str | None = Field(
+        default=None,
+        description="CSV with the columns size_um,volume_fraction; path relative to the study file.",
+    )
+    truncate_below_volume_fraction: Annotated[Number, Field(ge=0, lt=0.5)] = Field(
+        default=0.0,
+        description="Classes below this volume share are left out of the packing (not of the resistance).",
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Csd:
+        if (self.mixture is None) == (self.file is None):
+            raise ValueError("needs exactly one of mixture and file")
+        return self
+
+
+class Material(Model):
+    """The crystals, and the base value of every property a sweep may vary."""
+
+    density_kg_m3: Density = Field(description="Crystal density, kg/m3.")
+    youngs_modulus_MPa: YoungsModulus = Field(default=5.0, description="Young's modulus, MPa.")  # noqa: N815
+    poisson_ratio: PoissonRatio = Field(default=0.2, description="Poisson's ratio.")
+    restitution: Restitution = Field(default=0.3, description="Coefficient of restitution.")
+    friction: Friction = Field(default=0.0, description="Coefficient of friction.")
+    cohesion_kJ_m3: Cohesion = Field(default=50.0, description="Cohesion energy density, kJ/m3.")  # noqa: N815
+    sphericity: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=1.0, description="Sphericity in the resistance law; packings are of spheres."
+    )
+
+
+class Packing(Model):
+    """How the packings are made."""
+
+    particles: Annotated[Whole, Field(ge=50, le=2_000_000)] = Field(default=2000, description="Spheres in one packing.")
+    void_fraction: Annotated[Number, Field(ge=0.5, le=0.95)] = Field(
+        default=0.65, description="Void fraction of the initial cloud; 0.65, or 0.60 for broad distributions."
+    )
+    settling_velocity_m_s: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0.01, description="Initial downward speed of the spheres, m/s."
+    )
+    time_step_rayleigh: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.36, description="Time step over the Rayleigh time step of the smallest sphere."
+    )
+    time_step_us: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None, description="Time step, us; overrides time_step_rayleigh."
+    )
+    replicates: Annotated[Whole, Field(ge=1, le=1000)] = Field(
+        default=3, description="Packings per point, from different initial clouds."
+    )
+    engine: EngineName = Field(default="auto", description="auto takes the best engine on this machine; or name one.")
+    seed: Annotated[Whole, Field(ge=0)] = Field(default=1, description="Base seed of all random numbers.")
+    porosity_tolerance: Annotated[Number, Field(gt=0, le=0.01)] = Field(
+        default=1e-4, description="The bed is at rest when its porosity falls by less than this per check."
+    )
+    max_fall_times: Annotated[Number, Field(ge=1, le=100)] = Field(
+        default=4.0, description="Unsettled after this many free-fall times of the highest sphere."
+    )
+    skin_um: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None, description="Neighbour skin, um; the engine chooses if left out."
+    )
+    processes: Annotated[Whole, Field(ge=0, le=256)] = Field(
+        default=0, description="MPI processes of one packing; 0 chooses by size."
+    )
+    time_limit_min: Annotated[Number, Field(gt=0)] = Field(
+        default=240.0, description="Wall-clock limit of one packing, min."
+    )
+    write_vtk: bool = Field(default=False, description="Keep pictures of the settling for ParaView.")
+
+
+class Sweep(Model):
+    """One block of points: every combination of the values given; what is left out keeps its base value."""
+
+    csd: Annotated[list[Name], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        description="Names of distributions from csds."
+    )
+    cohesion_kJ_m3: Annotated[list[Cohesion], BeforeValidator(_listed), Field(min_length=1)] | None = Field(  # noqa: N815
+        default=None, description="Cohesion energy densities, kJ/m3."
+    )
+    friction: Annotated[list[Friction], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+        default=None, description="Coefficients of friction."
+    )
+    poisson_ratio: Annotated[list[PoissonRatio], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+        default=None, description="Poisson's ratios."
+    )
+    restitution: Annotated[list[Restitution], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+        default=None, description="Coefficients of restitution."
+    )
+    youngs_modulus_MPa: (  # noqa: N815
+        Annotated[list[YoungsModulus], BeforeValidator(_listed), Field(min_length=1)] | None
+    ) = Field(default=None, description="Young's moduli, MPa.")
+    replicates: Annotated[Whole, Field(ge=1, le=1000)] | None = Field(
+        default=None, description="Packings per point of this block, instead of packing.replicates."
+    )
+
+
+class Published(Model):
+    """A published value to stand beside ours."""
+
+    csd: Name = Field(description="Name of a distribution from csds.")
+    quantity: Literal["porosity", "resistance_m_kg", "system_dimension_um"] = Field(description="What was published.")
+    value: Number = Field(description="The value, in the unit its name says.")
+    source: Annotated[str, Field(max_length=80)] = Field(description="Where it is from, for the legend.")
+    kind: Literal["simulation", "measurement"] = Field(description="Simulated or measured.")
+    cohesion_kJ_m3: Cohesion | None = Field(default=None, description="At this cohesion, kJ/m3.")  # noqa: N815
+    friction: Friction | None = Field(default=None, description="At this friction.")
+
+
+class Study(Model):
+    """A parameter study: distributions, material, packing settings and the points to visit."""
+
+    title: Annotated[str, Field(max_length=120)] = Field(default="", description="One line for figures and reports.")
+    csds: Annotated[dict[Name, Csd], Field(min_length=1)] = Field(description="The distributions by name.")
+    material: Material = Field(description="The crystals.")
+    packing: Packing = Field(default=Packing(), description="How the packings are made.")
+    sweeps: Annotated[list[Sweep], Field(min_length=1)] = Field(description="Blocks of points; their union is visited.")
+    published: list[Published] = Field(default=[], description="Published values to show beside ours.")
+
+
+class Workflow(Model):
+    """The workflow's configuration: which studies to run, and where their results go."""
+
+    studies: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
+        default=["pmma"], description="Names of files in config/studies, or paths of study files."
+    )
+    results: Annotated[str, Field(min_length=1)] = Field(default="results", description="Folder of the results.")

@@ -1,0 +1,349 @@
+"""Read configuration files and say everything that is wrong with them at once: file, key, value, what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from filtercake import contact
+from filtercake.config import (
+    DOUBTFUL_RELATIVE_OVERLAP,
+    LARGEST_RELATIVE_OVERLAP,
+    NAME,
+    Csd,
+    Study,
+    Workflow,
+)
+from filtercake.csd import CrystalSizeDistribution, mixture, read_csd, truncate
+from filtercake.errors import ConfigError, CsdError, Problem
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE
+
+LARGEST_FILE = 1_000_000
+"""Bytes of a configuration file beyond which it is surely not one."""
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class LoadedCsd:
+    """A distribution of a study, whole and as it is packed.
+
+    Attributes
+    ----------
+    full, truncated : CrystalSizeDistribution
+        The whole distribution and the one that is packed.
+    label : str
+        Name in figures.
+    file : Path or None
+        The user's CSV it was read from.
+    """
+
+    full: CrystalSizeDistribution
+    truncated: CrystalSizeDistribution
+    label: str
+    file: Path | None
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """A study whose every value has been checked.
+
+    Attributes
+    ----------
+    name : str
+        The study file's stem.
+    path : Path
+        The study file.
+    model : Study
+        Its contents.
+    csds : dict of str to LoadedCsd
+        Its distributions.
+    warnings : tuple of str
+        What is allowed but doubtful.
+    """
+
+    name: str
+    path: Path
+    model: Study
+    csds: dict[str, LoadedCsd]
+    warnings: tuple[str, ...]
+
+
+def load_workflow(values: dict[str, Any], file: str) -> Workflow:
+    """Check the workflow's own configuration (already parsed by Snakemake).
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+    """
+    studies = values.get("studies")
+    if isinstance(studies, str):  # --config studies=a,b
+        values = {**values, "studies": [name.strip() for name in studies.split(",") if name.strip()]}
+    return _parse(Workflow, values, file)
+
+
+def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
+    """Paths of the studies asked for; names are looked up in ``folder``.
+
+    Raises
+    ------
+    ConfigError
+        If a study does not exist, or two have the same name.
+    """
+    paths: list[Path] = []
+    problems: list[Problem] = []
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    for index, study in enumerate(workflow.studies):
+        path = Path(study) if study.endswith((".yaml", ".yml")) else folder / f"{study}.yaml"
+        key = f"studies[{index}]"
+        if not NAME.match(path.stem):
+            problems.append(Problem(file, key, repr(study), "a study's file name must be letters, digits, - and _"))
+        elif not path.is_file():
+            allowed = f"no such study; allowed: {', '.join(known)}, or the path of a study file"
+            problems.append(Problem(file, key, repr(study), allowed + _did_you_mean(study, known)))
+        elif path.stem in [other.stem for other in paths]:
+            problems.append(Problem(file, key, repr(study), "two studies of the same name; rename one file"))
+        paths.append(path)
+    if problems:
+        raise ConfigError(problems)
+    return paths
+
+
+def load_study(path: Path) -> LoadedStudy:
+    """Read and check a study.
+
+    Raises
+    ------
+    ConfigError
+        With every problem found in the file and the files it names.
+    """
+    model = _parse(Study, read_yaml(path), str(path))
+    problems = list(_reference_problems(model, str(path)))
+    csds: dict[str, LoadedCsd] = {}
+    for name, csd in model.csds.items():
+        try:
+            csds[name] = _load_csd(name, csd, path.parent)
+        except CsdError as error:
+            key = f"csds.{name}.{'file' if csd.file else 'mixture'}"
+            value = repr(csd.file) if csd.file else f"{len(csd.mixture or [])} classes"
+            problems.append(Problem(str(path), key, value, str(error)))
+    problems += _stability_problems(model, csds, str(path))
+    if problems:
+        raise ConfigError(problems)
+    return LoadedStudy(path.stem, path, model, csds, tuple(_doubts(model, str(path))))
+
+
+def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
+    """Load several studies and report the problems of all of them together.
+
+    Raises
+    ------
+    ConfigError
+        With every problem of every study.
+    """
+    studies: list[LoadedStudy] = []
+    problems: list[Problem] = []
+    for path in paths:
+        try:
+            studies.append(load_study(path))
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    return studies
+
+
+def read_yaml(path: Path) -> Any:
+    """Parse a YAML file without tags, aliases that multiply, or surprises.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read or is not YAML.
+    """
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise ConfigError([Problem(str(path), "(file)", f"{path.stat().st_size} bytes", "at most 1 MB")])
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise ConfigError([Problem(str(path), "(file)", "", f"cannot be read: {error.strerror}")]) from None
+    except UnicodeDecodeError:
+        raise ConfigError([Problem(str(path), "(file)", "", "must be UTF-8 text")]) from None
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "(file)"
+        raise ConfigError([Problem(str(path), where, "", f"not valid YAML: {error.problem}")]) from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise ConfigError([Problem(str(path), "(file)", "", f"not valid YAML: {error}")]) from None
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe YAML without aliases (they can multiply a small file into a huge one) and without doubled keys."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(None, None, "aliases (*name) are not allowed here", event.start_mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, (list, dict)):
+                raise yaml.constructor.ConstructorError(None, None, "keys must be plain text", key_node.start_mark)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key {key!r} stands twice", key_node.start_mark
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def _parse(model: type[M], values: Any, file: str) -> M:
+    if not isinstance(values, dict):
+        raise ConfigError([Problem(file, "(file)", _shown(values), "must be a mapping of keys to values")])
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise ConfigError([_problem(model, item, file) for item in error.errors()]) from None
+
+
+def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
+    location = [part for part in item["loc"] if part != "[key]"]
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".") or "(file)"
+    value, message = _shown(item["input"]), item["msg"].removeprefix("Value error, ")
+    if item["type"] == "extra_forbidden":
+        allowed = _allowed_keys(model, location[:-1])
+        message = f"unknown key; allowed here: {', '.join(allowed)}{_did_you_mean(str(location[-1]), allowed)}"
+    elif item["type"] == "missing":
+        value, message = "(missing)", "must be given"
+    elif item["type"] == "literal_error":
+        message = f"allowed: {item['ctx']['expected']}"
+    elif message.startswith("Input should"):
+        message = "must" + message.removeprefix("Input should")
+    elif item["type"] == "too_short":
+        message = "must hold at least one value"
+    return Problem(file, key, value, message)
+
+
+def _allowed_keys(model: type[BaseModel], location: list[Any]) -> list[str]:
+    """Keys of the part of the model that a location leads to."""
+    for part in location:
+        if isinstance(part, int) or not hasattr(model, "model_fields"):
+            continue
+        if part in model.model_fields:
+            model = _inner_model(model.model_fields[part].annotation) or model
+    return list(model.model_fields)
+
+
+def _inner_model(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _did_you_mean(word: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+def _load_csd(name: str, csd: Csd, folder: Path) -> LoadedCsd:
+    file = (folder / csd.file) if csd.file else None
+    if file is not None:
+        full = read_csd(file)
+    else:
+        classes = csd.mixture or []
+        full = mixture([c.size_um * MICROMETRE for c in classes], [c.volume_fraction for c in classes])
+    truncated = truncate(full, csd.truncate_below_volume_fraction).csd
+    return LoadedCsd(full, truncated, csd.label or name, file)
+
+
+def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
+    """Names of distributions that the study does not define."""
+    known = list(model.csds)
+    named = [(f"sweeps[{i}].csd[{j}]", name) for i, s in enumerate(model.sweeps) for j, name in enumerate(s.csd)]
+    named += [(f"published[{i}].csd", entry.csd) for i, entry in enumerate(model.published)]
+    for key, name in named:
+        if name not in model.csds:
+            allowed = f"not in csds; allowed: {', '.join(known)}{_did_you_mean(name, known)}"
+            yield Problem(file, key, repr(name), allowed)
+
+
+def _elastic_constants(model: Study, index: int) -> Iterable[tuple[float, float]]:
+    """Young's moduli (Pa) and Poisson's ratios that one sweep visits."""
+    sweep, material = model.sweeps[index], model.material
+    for modulus in sweep.youngs_modulus_MPa or [material.youngs_modulus_MPa]:
+        for poisson in sweep.poisson_ratio or [material.poisson_ratio]:
+            yield modulus * MEGAPASCAL, poisson
+
+
+def _cohesions(model: Study, index: int) -> Iterable[tuple[str, float]]:
+    given = model.sweeps[index].cohesion_kJ_m3
+    if given is None:
+        yield "material.cohesion_kJ_m3", model.material.cohesion_kJ_m3
+    else:
+        for j, value in enumerate(given):
+            yield f"sweeps[{index}].cohesion_kJ_m3[{j}]", value
+
+
+def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> list[Problem]:
+    """Cohesion over the limit where soft contacts turn the bed over, and time steps over the Rayleigh step."""
+    found: dict[str, Problem] = {}
+    for index, sweep in enumerate(model.sweeps):
+        for modulus, poisson in _elastic_constants(model, index):
+            limit = contact.cohesion_at_overlap(LARGEST_RELATIVE_OVERLAP, modulus, poisson) / KILOJOULE_PER_M3
+            for key, cohesion in _cohesions(model, index):
+                if cohesion > limit:
+                    found[key] = Problem(file, key, f"{cohesion:g}", _over_cohesion(limit, modulus, poisson))
+            step_us = model.packing.time_step_us
+            for name in sweep.csd if step_us is not None else []:
+                if name not in csds:
+                    continue
+                rayleigh = contact.rayleigh_time_step(
+                    0.5 * csds[name].truncated.smallest, model.material.density_kg_m3, modulus, poisson
+                )
+                if step_us is not None and step_us * MICROMETRE >= rayleigh:
+                    allowed = (
+                        f"must be below the Rayleigh time step {rayleigh / MICROMETRE:.4g} us of {name}; "
+                        f"the default {model.packing.time_step_rayleigh:g} of it is "
+                        f"{model.packing.time_step_rayleigh * rayleigh / MICROMETRE:.3g} us"
+                    )
+                    found["packing.time_step_us"] = Problem(file, "packing.time_step_us", f"{step_us:g}", allowed)
+    return list(found.values())
+
+
+def _over_cohesion(limit: float, modulus: float, poisson: float) -> str:
+    return (
+        f"must be at most {limit:.0f} kJ/m3 at E = {modulus / MEGAPASCAL:g} MPa and nu = {poisson:g}: above it, "
+        f"contacts overlap by more than {LARGEST_RELATIVE_OVERLAP:.1%} of the diameter; use a larger youngs_modulus_MPa"
+    )
+
+
+def _doubts(model: Study, file: str) -> Iterable[str]:
+    """Warnings: allowed, but the answer depends on the softness of the contacts."""
+    seen = set()
+    for index in range(len(model.sweeps)):
+        for modulus, poisson in _elastic_constants(model, index):
+            for key, cohesion in _cohesions(model, index):
+                overlap = contact.relative_overlap(cohesion * KILOJOULE_PER_M3, modulus, poisson)
+                if overlap > DOUBTFUL_RELATIVE_OVERLAP and key not in seen:
+                    seen.add(key)
+                    yield (
+                        f"{file}: {key} = {cohesion:g}: contacts overlap by {overlap:.1%} of the diameter, which alone "
+                        f"lowers the porosity by about {3 * 0.65 * overlap:.3f}"
+                    )

@@ -1,0 +1,326 @@
+"""A study as a list of sweep points, and the tables made of their packings."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from filtercake import contact
+from filtercake.config import Study, Sweep
+from filtercake.config_loading import LoadedStudy
+from filtercake.csd import CrystalSizeDistribution
+from filtercake.errors import PackingRejected
+from filtercake.packing.pack import MANIFEST, Outcome
+from filtercake.packing.result import Packing, read_record
+from filtercake.packing.spec import PackingSpec, digest
+from filtercake.porosity import measure
+from filtercake.resistance import carman_sauter, kozeny_carman
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
+
+CONFIDENCE = 0.95
+
+SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
+"""Properties a sweep may vary, besides the distribution."""
+
+MEASURED = ("porosity", "porosity_as_published", "resistance_m_kg", "resistance_sauter_m_kg")
+
+POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", *SWEPT, "engine")
+REPLICATE_COLUMNS = (
+    *POINT_COLUMNS,
+    "replicate",
+    "seed",
+    "status",
+    "reason",
+    "settled",
+    *MEASURED,
+    "porosity_from_floor",
+    "soft_contact_compaction",
+    "overlap_max",
+    "coordination",
+    "particles",
+    "length_um",
+    "bed_height_um",
+    "steps",
+    "wall_s",
+)
+SUMMARY_COLUMNS = (
+    *POINT_COLUMNS,
+    "n",
+    "n_failed",
+    "porosity",
+    "porosity_ci95",
+    "porosity_as_published",
+    "porosity_as_published_ci95",
+    "resistance_m_kg",
+    "resistance_ci95_m_kg",
+    "resistance_sauter_m_kg",
+    "resistance_sauter_ci95_m_kg",
+    "soft_contact_compaction",
+    "overlap_max",
+    "wall_s",
+)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One point of a study.
+
+    Attributes
+    ----------
+    name : str
+        Readable slug with a short hash of everything that decides the packing.
+    study, csd : str
+        Names of the study and of the distribution.
+    residence_time_min : float or None
+        Residence time of the crystallizer, where one made the distribution.
+    replicates : int
+        Packings asked for.
+    spec : PackingSpec
+        What is packed.
+    """
+
+    name: str
+    study: str
+    csd: str
+    residence_time_min: float | None
+    replicates: int
+    spec: PackingSpec
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, fit for JSON and a rule's params."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Point:
+        """Build a point from :meth:`as_dict`'s values."""
+        return cls(**{**values, "spec": PackingSpec.from_dict(values["spec"])})
+
+    def row(self) -> dict[str, Any]:
+        """Return the values of ``POINT_COLUMNS``, in the units their names say."""
+        return {
+            "point": self.name,
+            "study": self.study,
+            "csd": self.csd,
+            "residence_time_min": np.nan if self.residence_time_min is None else self.residence_time_min,
+            "cohesion_kJ_m3": _tidy(self.spec.cohesion / KILOJOULE_PER_M3),
+            "friction": self.spec.friction,
+            "poisson_ratio": self.spec.poisson_ratio,
+            "restitution": self.spec.restitution,
+            "youngs_modulus_MPa": _tidy(self.spec.youngs_modulus / MEGAPASCAL),
+            "engine": self.spec.engine,
+        }
+
+
+def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution, int], str]) -> list[Point]:
+    """List a study's points: the union of its sweeps; a point in two sweeps is visited once.
+
+    Parameters
+    ----------
+    study : LoadedStudy
+        The checked study.
+    choose_engine : callable
+        Names the engine for ``engine: auto``, from a distribution and a number of particles.
+    """
+    points: dict[str, Point] = {}
+    for sweep in study.model.sweeps:
+        axes = [_axis(study.model, sweep, name) for name in SWEPT]
+        replicates = sweep.replicates or study.model.packing.replicates
+        for csd, values in itertools.product(sweep.csd, itertools.product(*axes)):
+            point = _point(study, csd, dict(zip(SWEPT, values, strict=True)), replicates, choose_engine)
+            known = points.get(point.name)
+            if known is None or known.replicates < replicates:
+                points[point.name] = point
+    return list(points.values())
+
+
+def points_table(points: Iterable[Point]) -> pd.DataFrame:
+    """Tabulate points: ``POINT_COLUMNS`` and the replicates asked for."""
+    rows = [{**point.row(), "replicates": point.replicates} for point in points]
+    return pd.DataFrame(rows, columns=[*POINT_COLUMNS, "replicates"])
+
+
+def replicate_row(point: Point, packing: Packing, csd: CrystalSizeDistribution, sphericity: float) -> dict[str, Any]:
+    """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
+
+    Parameters
+    ----------
+    point : Point
+        Where it belongs.
+    packing : Packing
+        The packing.
+    csd : CrystalSizeDistribution
+        The full distribution: the resistance needs all of it.
+    sphericity : float
+        For the resistance law.
+    """
+    found, record = measure(packing, point.spec), packing.diagnostics
+    law = (csd, point.spec.density, sphericity)
+    return {
+        **point.row(),
+        "replicate": record["replicate"],
+        "seed": record["seed"],
+        "status": "ok",
+        "reason": "",
+        "settled": record["settled"],
+        "porosity": found.interior,
+        "porosity_as_published": found.as_published,
+        "resistance_m_kg": kozeny_carman(found.interior, *law),
+        "resistance_sauter_m_kg": carman_sauter(found.interior, *law),
+        "porosity_from_floor": found.from_floor,
+        "soft_contact_compaction": found.compaction,
+        "overlap_max": record["overlap_max"],
+        "coordination": record["coordination"],
+        "particles": record["particles"],
+        "length_um": record["length_m"] / MICROMETRE,
+        "bed_height_um": record["bed_height_m"] / MICROMETRE,
+        "steps": record["steps"],
+        "wall_s": record["wall_s"],
+    }
+
+
+def failed_row(point: Point, outcome: Outcome, reason: str) -> dict[str, Any]:
+    """Row of a replicate without an accepted packing: a status and a reason, everything else blank."""
+    who = {"replicate": outcome.replicate, "seed": outcome.seed}
+    return {**point.row(), **who, "status": "failed", "reason": reason, "settled": False}
+
+
+def replicates_table(
+    points: Iterable[Point], packings: Path, csds: dict[str, CrystalSizeDistribution], sphericity: float
+) -> pd.DataFrame:
+    """Measure every packing of a study, ``REPLICATE_COLUMNS``; a failed or damaged one is a row with a reason.
+
+    Parameters
+    ----------
+    points : iterable of Point
+        The study's points.
+    packings : Path
+        Folder with one folder per point.
+    csds : dict of str to CrystalSizeDistribution
+        The full distributions by name.
+    sphericity : float
+        For the resistance law.
+    """
+    rows = []
+    for point in points:
+        folder = packings / point.name
+        for entry in read_record(folder / MANIFEST)["replicates"]:
+            outcome = Outcome(**entry)
+            if outcome.status != "ok":
+                rows.append(failed_row(point, outcome, outcome.reason))
+                continue
+            try:
+                packing = Packing.load(folder / f"r{outcome.replicate}.npz")
+            except PackingRejected as error:
+                rows.append(failed_row(point, outcome, str(error)))
+                continue
+            rows.append(replicate_row(point, packing, csds[point.csd], sphericity))
+    return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
+
+
+def half_width(values: np.ndarray[Any, np.dtype[np.float64]], confidence: float = CONFIDENCE) -> float:
+    """Half-width of the Student t confidence interval of a mean; nan for fewer than two values.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Independent values.
+    confidence : float
+        Confidence level.
+    """
+    n = values.size
+    if n < 2:
+        return float("nan")
+    quantile = float(stats.t.ppf(0.5 + confidence / 2.0, n - 1))
+    return quantile * float(np.std(values, ddof=1)) / float(np.sqrt(n))
+
+
+def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
+    """Average the accepted replicates of every point, with 95 % intervals; ``SUMMARY_COLUMNS``.
+
+    A point of which every replicate failed keeps its row, with n = 0 and blank values.
+    """
+    rows = []
+    for _, group in replicates.groupby("point", sort=False):
+        good = group[group["status"] == "ok"]
+        row: dict[str, Any] = {column: group.iloc[0][column] for column in POINT_COLUMNS}
+        row.update(n=len(good), n_failed=len(group) - len(good), wall_s=good["wall_s"].sum())
+        for column in MEASURED:
+            values = good[column].to_numpy(np.float64)
+            row[column] = values.mean() if values.size else np.nan
+            row[_interval_name(column)] = half_width(values)
+        row["soft_contact_compaction"] = good["soft_contact_compaction"].mean()
+        row["overlap_max"] = good["overlap_max"].max()
+        rows.append(row)
+    return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
+
+
+def _interval_name(column: str) -> str:
+    return column.replace("_m_kg", "_ci95_m_kg") if column.endswith("_m_kg") else f"{column}_ci95"
+
+
+def _axis(study: Study, sweep: Sweep, name: str) -> list[float]:
+    values = getattr(sweep, name)
+    return [getattr(study.material, name)] if values is None else list(values)
+
+
+def _point(
+    study: LoadedStudy,
+    csd_name: str,
+    swept: dict[str, float],
+    replicates: int,
+    choose_engine: Callable[[CrystalSizeDistribution, int], str],
+) -> Point:
+    settings, material = study.model.packing, study.model.material
+    csd = study.csds[csd_name].truncated
+    modulus, poisson = swept["youngs_modulus_MPa"] * MEGAPASCAL, swept["poisson_ratio"]
+    rayleigh = contact.rayleigh_time_step(0.5 * csd.smallest, material.density_kg_m3, modulus, poisson)
+    engine = settings.engine if settings.engine != "auto" else choose_engine(csd, settings.particles)
+    spec = PackingSpec(
+        particles=settings.particles,
+        void_fraction=settings.void_fraction,
+        settling_velocity=settings.settling_velocity_m_s,
+        density=material.density_kg_m3,
+        youngs_modulus=modulus,
+        poisson_ratio=poisson,
+        restitution=swept["restitution"],
+        friction=swept["friction"],
+        cohesion=swept["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
+        time_step=(
+            settings.time_step_us * MICROMETRE
+            if settings.time_step_us is not None
+            else settings.time_step_rayleigh * rayleigh
+        ),
+        engine=engine,
+        seed=settings.seed,
+        porosity_tolerance=settings.porosity_tolerance,
+        max_fall_times=settings.max_fall_times,
+        skin=(settings.skin_um or 0.0) * MICROMETRE,
+        processes=settings.processes,
+        time_limit=settings.time_limit_min * MINUTE,
+        write_vtk=settings.write_vtk,
+    )
+    return Point(_slug(csd_name, swept, study.model, spec, csd), study.name, csd_name, None, replicates, spec)
+
+
+def _slug(csd_name: str, swept: dict[str, float], study: Study, spec: PackingSpec, csd: CrystalSizeDistribution) -> str:
+    """Readable prefix and a hash of all that decides the packing (not of time limits or labels)."""
+    parts = [csd_name, f"s{swept['cohesion_kJ_m3']:g}", f"mu{swept['friction']:g}"]
+    for name, short in (("poisson_ratio", "nu"), ("restitution", "e"), ("youngs_modulus_MPa", "E")):
+        if swept[name] != getattr(study.material, name):
+            parts.append(f"{short}{swept[name]:g}")
+    decisive = {key: value for key, value in asdict(spec).items() if key not in ("time_limit", "write_vtk")}
+    code = digest(decisive, csd.size.tolist(), csd.volume_fraction.tolist())[:8]
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", "_".join([*parts, code]))
+
+
+def _tidy(value: float) -> float:
+    """Undo the last bit lost in a change of unit, so that 50 kJ/m3 is written 50.0."""
+    return float(f"{value:.12g}")

@@ -1,0 +1,1 @@
+# Benchmarks: targets of their own, never part of a study.

@@ -1,0 +1,34 @@
+# One rule for all figures; the catalogue says which a study has, each depends only on its own module.
+
+
+rule figure:
+    input:
+        points="{results}/{study}/points.csv",
+        summary="{results}/{study}/summary.csv",
+        replicates="{results}/{study}/replicates.csv",
+        csds=csd_tables,
+        library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
+    output:
+        png=report(
+            "{results}/{study}/figures/{figure}.png",
+            category="{study}",
+            caption="../report/figure.rst",
+            labels={"figure": "{figure}"},
+        ),
+        pdf="{results}/{study}/figures/{figure}.pdf",
+    log:
+        "{results}/{study}/logs/figures/{figure}.log",
+    benchmark:
+        "{results}/{study}/benchmarks/figures/{figure}.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=2000,
+        runtime=15,
+    params:
+        study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
+        packings=lambda wildcards: f"{RESULTS}/{wildcards.study}/packings",
+    message:
+        "{wildcards.figure} of {wildcards.study}"
+    script:
+        "../scripts/figure.py"

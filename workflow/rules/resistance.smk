@@ -1,0 +1,124 @@
+# From packings to tables: porosity and resistance of every replicate, then means with intervals.
+
+
+rule points:
+    input:
+        library=library("study"),
+    output:
+        "{results}/{study}/points.csv",
+    log:
+        "{results}/{study}/logs/points.log",
+    benchmark:
+        "{results}/{study}/benchmarks/points.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        points=point_rows,
+    message:
+        "points of {wildcards.study}"
+    script:
+        "../scripts/points.py"
+
+
+rule replicates:
+    input:
+        manifests=manifests,
+        csds=csd_tables,
+        library=library("study"),
+    output:
+        "{results}/{study}/replicates.csv",
+    log:
+        "{results}/{study}/logs/replicates.log",
+    benchmark:
+        "{results}/{study}/benchmarks/replicates.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        points=point_rows,
+        sphericity=lambda wildcards: study_of(wildcards).model.material.sphericity,
+    message:
+        "porosity and resistance of every packing of {wildcards.study}"
+    script:
+        "../scripts/replicates.py"
+
+
+rule summary:
+    input:
+        replicates="{results}/{study}/replicates.csv",
+        library=library("study"),
+    output:
+        "{results}/{study}/summary.csv",
+    log:
+        "{results}/{study}/logs/summary.log",
+    benchmark:
+        "{results}/{study}/benchmarks/summary.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    message:
+        "means and intervals of {wildcards.study}"
+    script:
+        "../scripts/summary.py"
+
+
+rule tables:
+    input:
+        summary="{results}/{study}/summary.csv",
+        csds=csd_tables,
+        library=library("tables"),
+    output:
+        table1="{results}/{study}/tables/table1.csv",
+        table4="{results}/{study}/tables/table4.csv",
+    log:
+        "{results}/{study}/logs/tables.log",
+    benchmark:
+        "{results}/{study}/benchmarks/tables.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
+    message:
+        "tables of {wildcards.study}"
+    script:
+        "../scripts/tables.py"
+
+
+rule provenance:
+    input:
+        "{results}/{study}/points.csv",
+        "{results}/{study}/tables/table1.csv",
+        summary="{results}/{study}/summary.csv",
+        replicates="{results}/{study}/replicates.csv",
+        figures=lambda wildcards: expand(
+            "{results}/{study}/figures/{figure}.{suffix}",
+            results=RESULTS,
+            study=wildcards.study,
+            figure=figures_of(wildcards.study),
+            suffix=["png", "pdf"],
+        ),
+    output:
+        "{results}/{study}/provenance.json",
+    log:
+        "{results}/{study}/logs/provenance.log",
+    benchmark:
+        "{results}/{study}/benchmarks/provenance.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    message:
+        "provenance of {wildcards.study}"
+    script:
+        "../scripts/provenance.py"

@@ -1,0 +1,44 @@
+"""Rule packing: make all replicates of a point."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.csd import from_table
+from filtercake.job import Progress, job
+from filtercake.packing.pack import pack_replicates
+from filtercake.packing.spec import PackingSpec
+from filtercake.provenance import code_hash
+
+
+def main(table, sources, spec, replicates, manifest, point, logger):
+    """Pack and report each replicate as it comes."""
+    progress = Progress()
+
+    def report(outcome, record):
+        if outcome.status == "ok":
+            line = f"r{outcome.replicate}: {record['steps']:,} steps, {record['wall_s']:.1f} s"
+        else:
+            line = f"r{outcome.replicate} failed: {outcome.reason}"
+        logger.info(line)
+        progress.packed(f"{point} {line}")
+
+    def note(line):
+        logger.info(line)
+        progress.note(f"{point} {line}")
+
+    _, truncated = from_table(pd.read_csv(table))
+    code = code_hash([Path(source) for source in sources])
+    pack_replicates(PackingSpec.from_dict(spec), truncated, replicates, Path(manifest).parent, code, report, note)
+
+
+with job(snakemake.log[0]) as log:
+    main(
+        snakemake.input.csd,
+        [*snakemake.input.library, *snakemake.input.templates],
+        snakemake.params.spec,
+        snakemake.params.replicates,
+        snakemake.output[0],
+        snakemake.wildcards.point,
+        log,
+    )

@@ -1,0 +1,28 @@
+"""Rule replicates: measure porosity and resistance of every packing of a study."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.csd import from_table
+from filtercake.job import job
+from filtercake.packing.result import publish
+from filtercake.study import Point, replicates_table
+
+
+def main(points, packings, csd_tables, sphericity, output):
+    """Measure and write the table."""
+    csds = {Path(table).stem: from_table(pd.read_csv(table))[0] for table in csd_tables}
+    table = replicates_table(points, packings, csds, sphericity)
+    with publish(output) as temporary:
+        table.to_csv(temporary, index=False)
+
+
+with job(snakemake.log[0]):
+    main(
+        [Point.from_dict(values) for values in snakemake.params.points],
+        Path(snakemake.output[0]).parent / "packings",
+        snakemake.input.csds,
+        snakemake.params.sphericity,
+        Path(snakemake.output[0]),
+    )

@@ -1,0 +1,12 @@
+"""Rule summary: means and 95 % intervals of every point."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.job import job
+from filtercake.packing.result import publish
+from filtercake.study import summarise
+
+with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
+    summarise(pd.read_csv(snakemake.input.replicates)).to_csv(temporary, index=False)

@@ -1,0 +1,21 @@
+"""Rule tables: the paper's tables with our values beside the published ones."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.config import Study
+from filtercake.csd import from_table
+from filtercake.job import job
+from filtercake.packing.result import publish
+from filtercake.tables import table1, table4
+
+with job(snakemake.log[0]):
+    study = Study.model_validate(snakemake.params.study)
+    csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds}
+    for output, table in (
+        (snakemake.output.table1, table1(study, csds)),
+        (snakemake.output.table4, table4(study, csds, pd.read_csv(snakemake.input.summary))),
+    ):
+        with publish(Path(output)) as temporary:
+            table.to_csv(temporary, index=False)
