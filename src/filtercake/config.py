@@ -11,10 +11,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from filtercake.units import MICROSECOND
+
 LARGEST_RELATIVE_OVERLAP = 0.035
 """Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
 DOUBTFUL_RELATIVE_OVERLAP = 0.01
 """Contacts overlap by more than this share of the diameter: warned."""
+
+FRICTIONLESS_TIME_STEP = 0.36
+"""Default time step over the Rayleigh step at mu = 0."""
+FRICTIONAL_TIME_STEP = 0.2
+"""The same at mu > 0: rotation on several tangential springs is the fastest motion, and limits the step."""
 
 NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")
 """What a study or a distribution may be called: it names files and folders."""
@@ -127,8 +134,12 @@ class Packing(Model):
     settling_velocity_m_s: Annotated[Number, Field(ge=0, le=1)] = Field(
         default=0.01, description="Initial downward speed of the spheres, m/s."
     )
-    time_step_rayleigh: Annotated[Number, Field(gt=0, lt=1)] = Field(
-        default=0.36, description="Time step over the Rayleigh time step of the smallest sphere."
+    time_step_rayleigh: Annotated[Number, Field(gt=0, lt=1)] | None = Field(
+        default=None,
+        description=(
+            "Time step over the Rayleigh time step of the smallest sphere; "
+            f"{FRICTIONLESS_TIME_STEP:g} without friction and {FRICTIONAL_TIME_STEP:g} with it if left out."
+        ),
     )
     time_step_us: Annotated[Number, Field(gt=0)] | None = Field(
         default=None, description="Time step, us; overrides time_step_rayleigh."
@@ -154,6 +165,13 @@ class Packing(Model):
         default=240.0, description="Wall-clock limit of one packing, min."
     )
     write_vtk: bool = Field(default=False, description="Keep pictures of the settling for ParaView.")
+
+    def time_step(self, rayleigh: float, friction: float) -> float:
+        """Time step, s, from the Rayleigh time step (s) and the friction of a scene."""
+        if self.time_step_us is not None:
+            return self.time_step_us * MICROSECOND
+        default = FRICTIONAL_TIME_STEP if friction > 0.0 else FRICTIONLESS_TIME_STEP
+        return (self.time_step_rayleigh or default) * rayleigh
 
 
 class Sweep(Model):

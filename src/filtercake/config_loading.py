@@ -14,6 +14,8 @@ from pydantic import BaseModel, ValidationError
 from filtercake import contact
 from filtercake.config import (
     DOUBTFUL_RELATIVE_OVERLAP,
+    FRICTIONAL_TIME_STEP,
+    FRICTIONLESS_TIME_STEP,
     LARGEST_RELATIVE_OVERLAP,
     NAME,
     Csd,
@@ -22,7 +24,7 @@ from filtercake.config import (
 )
 from filtercake.csd import CrystalSizeDistribution, mixture, read_csd, truncate
 from filtercake.errors import ConfigError, CsdError, Problem
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND
 
 LARGEST_FILE = 1_000_000
 """Bytes of a configuration file beyond which it is surely not one."""
@@ -317,11 +319,10 @@ def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> 
                 rayleigh = contact.rayleigh_time_step(
                     0.5 * csds[name].truncated.smallest, model.material.density_kg_m3, modulus, poisson
                 )
-                if step_us is not None and step_us * MICROMETRE >= rayleigh:
+                if step_us is not None and step_us * MICROSECOND >= rayleigh:
                     allowed = (
-                        f"must be below the Rayleigh time step {rayleigh / MICROMETRE:.4g} us of {name}; "
-                        f"the default {model.packing.time_step_rayleigh:g} of it is "
-                        f"{model.packing.time_step_rayleigh * rayleigh / MICROMETRE:.3g} us"
+                        f"must be below the Rayleigh time step {rayleigh / MICROSECOND:.4g} us of {name}; leave it out "
+                        f"for {FRICTIONLESS_TIME_STEP:g} of that (without friction) or {FRICTIONAL_TIME_STEP:g} (with)"
                     )
                     found["packing.time_step_us"] = Problem(file, "packing.time_step_us", f"{step_us:g}", allowed)
     return list(found.values())

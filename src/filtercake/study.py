@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -262,6 +262,25 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
 
 
+def base_rows(study: Study, table: pd.DataFrame, free: Collection[str] = ()) -> pd.DataFrame:
+    """Rows of a table of points at the study's base material.
+
+    Parameters
+    ----------
+    study : Study
+        Its material is the base.
+    table : DataFrame
+        Has the columns ``SWEPT``.
+    free : collection of str
+        Properties of ``SWEPT`` that may have any value.
+    """
+    keep = np.ones(len(table), dtype=bool)
+    for name in SWEPT:
+        if name not in free:
+            keep &= np.isclose(table[name].to_numpy(np.float64), getattr(study.material, name))
+    return table[keep]
+
+
 def _interval_name(column: str) -> str:
     return column.replace("_m_kg", "_ci95_m_kg") if column.endswith("_m_kg") else f"{column}_ci95"
 
@@ -293,11 +312,7 @@ def _point(
         restitution=swept["restitution"],
         friction=swept["friction"],
         cohesion=swept["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
-        time_step=(
-            settings.time_step_us * MICROMETRE
-            if settings.time_step_us is not None
-            else settings.time_step_rayleigh * rayleigh
-        ),
+        time_step=settings.time_step(rayleigh, swept["friction"]),
         engine=engine,
         seed=settings.seed,
         porosity_tolerance=settings.porosity_tolerance,

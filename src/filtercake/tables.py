@@ -11,6 +11,7 @@ from filtercake.config import Published, Study
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.packing.cloud import box_length
 from filtercake.resistance import kozeny_carman
+from filtercake.study import base_rows
 from filtercake.units import MICROMETRE
 
 Csds = dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
@@ -87,11 +88,8 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
 
 def _base_point(study: Study, csd: str, summary: pd.DataFrame) -> pd.Series[Any] | None:
     """Row of a distribution at the study's base material, None where no sweep visits it."""
-    material = study.material
-    at_base = summary["csd"] == csd
-    for name in ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa"):
-        at_base &= np.isclose(summary[name], getattr(material, name))
-    return summary[at_base].iloc[0] if at_base.any() else None
+    found = base_rows(study, summary[summary["csd"] == csd])
+    return None if found.empty else found.iloc[0]
 
 
 def _value(published: Published | None) -> float:

@@ -12,6 +12,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MICROMETRE: Final = 1e-6
+MICROSECOND: Final = 1e-6
 MINUTE: Final = 60.0
 KILOJOULE_PER_M3: Final = 1e3
 MEGAPASCAL: Final = 1e6

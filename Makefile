@@ -1,0 +1,66 @@
+# The two commands: make run, make test. Both set up what they need first.
+VENV ?= .venv
+CORES ?= 2
+STUDIES ?=
+BIN := $(VENV)/bin
+SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
+CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
+
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+
+.PHONY: run test test-all lint format schemas figures regression speed resume retry lock setup clean help
+
+help:
+	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
+
+setup: ## create the environment; install LIGGGHTS where possible
+	@workflow/envs/setup.sh $(VENV)
+
+run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others)
+	$(SNAKEMAKE) $(CONFIG)
+
+test: setup lint ## lint, type-check and run the fast tests
+	$(BIN)/pytest
+
+test-all: setup lint ## every test, slow ones too
+	$(BIN)/pytest -m ""
+
+lint: setup ## ruff, mypy --strict, snakefmt, snakemake --lint
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/snakefmt --check --compact-diff Snakefile workflow
+	$(BIN)/snakemake --lint
+
+format: setup ## format the code
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/snakefmt Snakefile workflow
+
+schemas: setup ## regenerate the JSON schemas and the reference of config keys
+	$(BIN)/python -m filtercake.schema
+
+figures: setup ## redraw the figures
+	$(SNAKEMAKE) $(CONFIG) --forcerun figure
+
+regression: setup ## the paper's protocol against the authors' own numbers (about 15 min)
+	$(SNAKEMAKE) regression
+
+speed: setup ## tuned deck against the paper's protocol, one core (about 20 min)
+	$(BIN)/snakemake --cores 1 speed
+
+resume: setup ## go on after a kill or a crash; finished packings are kept
+	$(BIN)/snakemake --unlock $(CONFIG) >/dev/null 2>&1 || true
+	$(SNAKEMAKE) $(CONFIG) --rerun-incomplete
+
+retry: setup ## make the packings that failed once more
+	$(BIN)/python -m filtercake.retry results
+	$(SNAKEMAKE) $(CONFIG)
+
+lock: setup ## renew the lock file from pyproject.toml
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --generate-hashes \
+		--quiet --no-header --no-emit-index-url --output-file workflow/envs/requirements.lock
+
+clean: ## remove the results and the environment
+	rm -rf results .snakemake $(VENV)
