@@ -141,6 +141,12 @@ def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution,
     return list(points.values())
 
 
+def base_point(study: LoadedStudy, csd: str, choose_engine: Callable[[CrystalSizeDistribution, int], str]) -> Point:
+    """Return the point of a distribution at the study's base material."""
+    base = {name: getattr(study.model.material, name) for name in SWEPT}
+    return _point(study, csd, base, study.model.packing.replicates, choose_engine)
+
+
 def points_table(points: Iterable[Point]) -> pd.DataFrame:
     """Tabulate points: ``POINT_COLUMNS`` and the replicates asked for."""
     rows = [{**point.row(), "replicates": point.replicates} for point in points]

@@ -94,3 +94,34 @@ def _base_point(study: Study, csd: str, summary: pd.DataFrame) -> pd.Series[Any]
 
 def _value(published: Published | None) -> float:
     return float("nan") if published is None else published.value
+
+
+def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
+    """Set every published porosity simulated at a visited point beside ours by the same estimator.
+
+    ``deviation_sd`` is the published value's distance from our mean in standard deviations of one packing: a
+    published value is one packing (or a few), so that within three of them it is no different.
+    """
+    columns = ("csd", "cohesion_kJ_m3", "friction", "engine", "source", "published", "n")
+    columns += ("porosity_as_published", "sd", "deviation_sd", "porosity")
+    rows = []
+    for entry in study.published:
+        if entry.quantity != "porosity" or entry.cohesion_kJ_m3 is None or entry.friction is None:
+            continue
+        here = (replicates["csd"] == entry.csd) & (replicates["status"] == "ok")
+        here &= np.isclose(replicates["cohesion_kJ_m3"], entry.cohesion_kJ_m3)
+        here &= np.isclose(replicates["friction"], entry.friction)
+        for name in ("poisson_ratio", "restitution", "youngs_modulus_MPa"):
+            here &= np.isclose(replicates[name], getattr(study.material, name))
+        values = replicates.loc[here, "porosity_as_published"].to_numpy(np.float64)
+        if values.size < 2:
+            continue
+        mean, sd = float(values.mean()), float(values.std(ddof=1))
+        rows.append(
+            (
+                *(entry.csd, entry.cohesion_kJ_m3, entry.friction, replicates.loc[here, "engine"].iloc[0]),
+                *(entry.source, entry.value, values.size, mean, sd, (entry.value - mean) / sd),
+                float(replicates.loc[here, "porosity"].mean()),
+            )
+        )
+    return pd.DataFrame(rows, columns=list(columns))

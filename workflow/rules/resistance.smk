@@ -72,11 +72,13 @@ rule summary:
 rule tables:
     input:
         summary="{results}/{study}/summary.csv",
+        replicates="{results}/{study}/replicates.csv",
         csds=csd_tables,
         library=library("tables"),
     output:
         table1="{results}/{study}/tables/table1.csv",
         table4="{results}/{study}/tables/table4.csv",
+        comparison="{results}/{study}/tables/comparison.csv",
     log:
         "{results}/{study}/logs/tables.log",
     benchmark:

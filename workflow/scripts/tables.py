@@ -8,7 +8,7 @@ from filtercake.config import Study
 from filtercake.csd import from_table
 from filtercake.job import job
 from filtercake.packing.result import publish
-from filtercake.tables import table1, table4
+from filtercake.tables import comparison, table1, table4
 
 with job(snakemake.log[0]):
     study = Study.model_validate(snakemake.params.study)
@@ -16,6 +16,7 @@ with job(snakemake.log[0]):
     for output, table in (
         (snakemake.output.table1, table1(study, csds)),
         (snakemake.output.table4, table4(study, csds, pd.read_csv(snakemake.input.summary))),
+        (snakemake.output.comparison, comparison(study, pd.read_csv(snakemake.input.replicates))),
     ):
         with publish(Path(output)) as temporary:
             table.to_csv(temporary, index=False)

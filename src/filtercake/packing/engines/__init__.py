@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from filtercake.errors import EngineMissing
 from filtercake.packing.engines.base import Engine, SettleRequest
+from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
 
 ENGINES: dict[str, type[Engine]] = {
     Liggghts.name: Liggghts,
+    Embedded.name: Embedded,
     LiggghtsAsPublished.name: LiggghtsAsPublished,
 }
 
