@@ -28,8 +28,8 @@ onstart:
 
 
 onsuccess:
-    report_success()
+    print(console.success(Path(RESULTS), POINTS))
 
 
 onerror:
-    report_failure(log)
+    print(console.failure(Path(log)), file=sys.stderr)

@@ -69,7 +69,7 @@ Restitution = Annotated[Number, Field(gt=0, lt=1)]
 Friction = Annotated[Number, Field(ge=0, le=2)]
 Cohesion = Annotated[Number, Field(ge=0)]
 
-EngineName = Literal["auto", "liggghts", "liggghts_as_published"]
+EngineName = Literal["auto", "liggghts", "embedded", "liggghts_as_published"]
 
 
 class Model(BaseModel):

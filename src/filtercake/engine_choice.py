@@ -9,16 +9,20 @@ from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
 from filtercake.packing.engines import ENGINES
 
-PREFERENCE = ("liggghts",)
-"""Engines for ``engine: auto``, best first."""
+SMALL_BED = 10_000
+"""Spheres up to which LIGGGHTS is taken whatever the width of the distribution."""
+NARROW = 4.0
+"""Ratio of the largest to the smallest size up to which LIGGGHTS is taken whatever the number of spheres."""
 
 
-def choose(csd: CrystalSizeDistribution, particles: int) -> str:  # noqa: ARG001 - what a later engine decides on
-    """Name the engine for ``engine: auto``: the first of ``PREFERENCE`` that runs here."""
-    for name in PREFERENCE:
-        if ENGINES[name]().why_missing() is None:
-            return name
-    return PREFERENCE[0]
+def choose(csd: CrystalSizeDistribution, particles: int) -> str:
+    """Name the engine for ``engine: auto``.
+
+    LIGGGHTS where it is installed and the bed is small or narrow; the embedded engine everywhere else: LIGGGHTS
+    lists neighbours on one grid, which a wide distribution fills with pairs that never touch.
+    """
+    suits = particles <= SMALL_BED or csd.largest <= NARROW * csd.smallest
+    return "liggghts" if suits and ENGINES["liggghts"]().why_missing() is None else "embedded"
 
 
 def check(studies: Iterable[LoadedStudy]) -> None:
@@ -32,9 +36,9 @@ def check(studies: Iterable[LoadedStudy]) -> None:
     problems = []
     for study in studies:
         asked = study.model.packing.engine
-        reasons = [ENGINES[name]().why_missing() for name in (PREFERENCE if asked == "auto" else (asked,))]
-        if all(reason is not None for reason in reasons):
-            allowed = f"an engine installed on this machine; {reasons[-1]}"
+        reason = ENGINES[asked]().why_missing() if asked != "auto" else None
+        if reason is not None:
+            allowed = f"an engine that runs on this machine (auto takes one); {reason}"
             problems.append(Problem(str(study.path), "packing.engine", asked, allowed))
     if problems:
         raise ConfigError(problems)

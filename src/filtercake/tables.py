@@ -16,6 +16,20 @@ from filtercake.units import MICROMETRE
 
 Csds = dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
 
+COMPARISON_COLUMNS = (
+    "csd",
+    "cohesion_kJ_m3",
+    "friction",
+    "engine",
+    "source",
+    "published",
+    "n",
+    "porosity_as_published",
+    "sd",
+    "deviation_sd",
+    "porosity",
+)
+
 
 def published_value(study: Study, csd: str, quantity: str, kind: str) -> Published | None:
     """First published value of a quantity for a distribution, None where there is none."""
@@ -102,8 +116,6 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
     ``deviation_sd`` is the published value's distance from our mean in standard deviations of one packing: a
     published value is one packing (or a few), so that within three of them it is no different.
     """
-    columns = ("csd", "cohesion_kJ_m3", "friction", "engine", "source", "published", "n")
-    columns += ("porosity_as_published", "sd", "deviation_sd", "porosity")
     rows = []
     for entry in study.published:
         if entry.quantity != "porosity" or entry.cohesion_kJ_m3 is None or entry.friction is None:
@@ -124,4 +136,4 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
                 float(replicates.loc[here, "porosity"].mean()),
             )
         )
-    return pd.DataFrame(rows, columns=list(columns))
+    return pd.DataFrame(rows, columns=list(COMPARISON_COLUMNS))

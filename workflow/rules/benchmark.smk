@@ -10,7 +10,9 @@ rule speed:
 rule time_against_published:
     input:
         library=library("benchmark"),
-        templates=sorted(str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")),
+        templates=sorted(
+            str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
+        ),
     output:
         timings="{results}/benchmark/timings.csv",
         comparison="{results}/benchmark/speed.csv",

@@ -1,16 +1,14 @@
 # Loads and checks the configuration, and offers the helpers that the rules share. Stops here, before any job,
 # with every problem of every file when something is wrong.
-import json
 import os
-import re
 import sys
 from pathlib import Path
 
-from filtercake import engine_choice
+from filtercake import console, engine_choice
 from filtercake.config_loading import find_studies, load_studies, load_workflow
 from filtercake.errors import FiltercakeError
 from filtercake.figures import catalogue
-from filtercake.job import PROGRESS_VARIABLE, Progress, failure_reason
+from filtercake.job import PROGRESS_VARIABLE, Progress
 from filtercake.packing.engines.liggghts import processes as process_count
 from filtercake.packing.pack import MANIFEST
 from filtercake.provenance import sources
@@ -44,12 +42,7 @@ except FiltercakeError as error:
     stop(error)
 
 RESULTS = settings.results
-PACKINGS_LEFT = sum(
-    point.replicates
-    for name, points in POINTS.items()
-    for point in points.values()
-    if not Path(RESULTS, name, "packings", point.name, MANIFEST).exists()
-)
+PACKINGS_LEFT = console.packings_left(Path(RESULTS), POINTS)
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
 
 
@@ -96,65 +89,25 @@ def figures_of(study):
     return catalogue.figures_of(POINTS[study].values(), STUDIES[study].model)
 
 
+def csd_params(wildcards):
+    csd = study_of(wildcards).model.csds[wildcards.csd]
+    classes = [[item.size_um, item.volume_fraction] for item in csd.mixture or []]
+    return {"classes": classes, "truncation": csd.truncate_below_volume_fraction}
+
+
+def csd_file(wildcards):
+    file = study_of(wildcards).csds[wildcards.csd].file
+    return [str(file)] if file else []
+
+
+def packing_minutes(wildcards, attempt):
+    """Walltime from the packing's own limit; doubled on every retry."""
+    return min(10_080, attempt * max(30, point_of(wildcards).spec.particles // 100))
+
+
 def begin_run():
     Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), PACKINGS_LEFT)
     for study in STUDIES.values():
         for warning in study.warnings:
             print(f"warning: {warning}", file=sys.stderr)
-    engines = sorted(
-        {point.spec.engine for points in POINTS.values() for point in points.values()}
-    )
-    total = sum(len(points) for points in POINTS.values())
-    print(
-        f"filtercake: {', '.join(STUDIES)}: {total} points, {PACKINGS_LEFT} packings to make with {', '.join(engines)}",
-        file=sys.stderr,
-    )
-
-
-def failed_packings(study):
-    """(point, replicate, reason) of every packing that failed in a finished study."""
-    for point in POINTS[study]:
-        manifest = Path(RESULTS, study, "packings", point, MANIFEST)
-        if manifest.exists():
-            for entry in json.loads(manifest.read_text())["replicates"]:
-                if entry["status"] != "ok":
-                    yield point, entry["replicate"], entry["reason"]
-
-
-def report_success():
-    for study in STUDIES:
-        folder = Path(RESULTS, study)
-        print(
-            f"\n{study}: figures in {folder / 'figures'}, tables in {folder / 'tables'}, numbers in {folder / 'summary.csv'}"
-        )
-        failed = list(failed_packings(study))
-        if failed:
-            print(
-                f"{len(failed)} packings failed (rows with status failed in {folder / 'replicates.csv'}):"
-            )
-        for point, replicate, reason in failed[:5]:
-            print(f"  {point} r{replicate}: {reason}")
-
-
-def report_failure(snakemake_log):
-    """Name the failing jobs, their reasons and logs, and the command that resumes."""
-    text = Path(snakemake_log).read_text(errors="replace")
-    pattern = (
-        r"Error in rule (?P<rule>\w+):.*?\n(?P<body>(?:[ ]{4}.*\n)+)"
-    )
-    seen = set()
-    for match in re.finditer(pattern, text):
-        logged = re.search(r"^\s*log: (\S+)", match["body"], re.MULTILINE)
-        log_file = logged[1] if logged else ""
-        if (match["rule"], log_file) in seen:
-            continue
-        seen.add((match["rule"], log_file))
-        reason = failure_reason(Path(log_file)) if log_file else ""
-        print(
-            f"\nfailed: {match['rule']} {Path(log_file).stem}\n  reason: {reason or 'see the log'}\n  log:    {log_file}",
-            file=sys.stderr,
-        )
-    print(
-        "\nFinished packings are kept. Resume with: make resume (or: snakemake --cores 2 --rerun-incomplete)",
-        file=sys.stderr,
-    )
+    print(console.plan(POINTS, PACKINGS_LEFT), file=sys.stderr)

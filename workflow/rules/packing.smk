@@ -1,16 +1,13 @@
 # All replicates of a point in one job: start-up costs as much as a small packing.
 
 
-def packing_minutes(wildcards, attempt):
-    """Walltime from the packing's own limit; doubled on every retry."""
-    return min(10_080, attempt * max(30, point_of(wildcards).spec.particles // 100))
-
-
 rule packing:
     input:
         csd=lambda wildcards: f"{RESULTS}/{wildcards.study}/csd/{point_of(wildcards).csd}.csv",
         library=library("packing.pack"),
-        templates=sorted(str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")),
+        templates=sorted(
+            str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
+        ),
     output:
         "{results}/{study}/packings/{point}/replicates.json",
     log:

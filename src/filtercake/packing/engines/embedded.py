@@ -112,7 +112,9 @@ class Bed:
     Airborne rows hold the state at release.
     """
 
-    def __init__(self, position: FloatArray, velocity: FloatArray, radius: FloatArray, length: float, spec: PackingSpec):
+    def __init__(
+        self, position: FloatArray, velocity: FloatArray, radius: FloatArray, length: float, spec: PackingSpec
+    ):
         """Start from positions (n, 3) m, velocities (n, 3) m/s and radii (n,) m; every sphere is in the bed."""
         n = radius.size
         self.spec, self.length, self.total = spec, length, n
@@ -267,15 +269,22 @@ class Bed:
         old = self.pairs
         new = Pairs.empty(old.neighbour.size, self.frictional) if self.frictional else old
         first = np.empty(n + 1, dtype=np.int64)
-        grid = (self.largest, self.cell_size, start, shape, offset, self.length, self.skin, first)
-        bed = (self.position[:n], self.radius[:n], self.level[:n])
-        count = kernels.find_pairs(*bed, *grid, new.neighbour, new.image)
+        grid = kernels.Grid(start, shape, offset, self.largest, self.cell_size)
+        count = self._find_pairs(grid, first, new)
         if count > new.neighbour.size:
             new = Pairs.empty(int(1.5 * count), self.frictional)
-            kernels.find_pairs(*bed, *grid, new.neighbour, new.image)
+            self._find_pairs(grid, first, new)
         new.first = first
-        material = (self.modulus, self.shear_modulus, self.damping_ratio)
-        kernels.pair_constants(self.radius[:n], self.mass[:n], first, new.neighbour, *material, new.constants)
+        kernels.pair_constants(
+            self.radius[:n],
+            self.mass[:n],
+            first,
+            new.neighbour,
+            self.modulus,
+            self.shear_modulus,
+            self.damping_ratio,
+            new.constants,
+        )
         if self.frictional:
             known = old.first.size - 1
             origin = np.where(order < known, order, -1)
@@ -283,6 +292,22 @@ class Bed:
         self.pairs = new
         self.reference[:n] = self.position[:n]
         self.listed = True
+
+    def _find_pairs(self, grid: kernels.Grid, first: IntArray, pairs: Pairs) -> int:
+        n = self.count
+        return int(
+            kernels.find_pairs(
+                self.position[:n],
+                self.radius[:n],
+                self.level[:n],
+                grid,
+                self.length,
+                self.skin,
+                first,
+                pairs.neighbour,
+                pairs.image,
+            )
+        )
 
     def _arrays(self) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.generic]], ...]:
         return (

@@ -9,12 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from filtercake.units import FloatArray, IntArray
+
+
+class Grid(NamedTuple):
+    """Cells of every size level: first sphere of each cell, cells per axis, first cell, largest radius, cell side."""
+
+    start: IntArray
+    shape: IntArray
+    offset: IntArray
+    largest: FloatArray
+    cell_size: FloatArray
+
 
 # columns of a pair's constants
 RADIUS_SUM, RADIUS_DIFFERENCE_SQUARED, STIFFNESS, DAMPING, SHEAR_STIFFNESS, SHEAR_DAMPING = range(6)
@@ -76,11 +87,7 @@ def find_pairs(
     position: FloatArray,
     radius: FloatArray,
     level: IntArray,
-    largest: FloatArray,
-    cell_size: FloatArray,
-    start: IntArray,
-    shape: IntArray,
-    offset: IntArray,
+    grid: Grid,
     length: float,
     skin: float,
     first: IntArray,
@@ -92,6 +99,7 @@ def find_pairs(
     ``first[i]:first[i + 1]`` are sphere i's neighbours; ``image`` codes the neighbour's periodic image. When
     the arrays are too short, the number returned is larger than their size and they hold only a part.
     """
+    start, shape, offset, largest, cell_size = grid
     n = radius.size
     capacity = neighbour.size
     count = 0
@@ -264,7 +272,9 @@ def make_advance(cohesive: bool, frictional: bool) -> Callable[..., tuple[int, b
                         quarter = math.sqrt(root)
                         du, dv, dw = ui - velocity[j, 0], vi - velocity[j, 1], wi - velocity[j, 2]
                         normal_speed = du * nx + dv * ny + dw * nz
-                        normal = constants[p, STIFFNESS] * overlap * root - constants[p, DAMPING] * quarter * normal_speed
+                        normal = (
+                            constants[p, STIFFNESS] * overlap * root - constants[p, DAMPING] * quarter * normal_speed
+                        )
                         push = normal
                         if cohesive:
                             push -= (
