@@ -18,7 +18,7 @@ from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import embedded_kernels as kernels
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.result import SettledState
-from filtercake.packing.settling import StopRule, Trajectory
+from filtercake.packing.settling import Trajectory
 from filtercake.packing.spec import PackingSpec
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
@@ -113,9 +113,16 @@ class Bed:
     """
 
     def __init__(
-        self, position: FloatArray, velocity: FloatArray, radius: FloatArray, length: float, spec: PackingSpec
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        radius: FloatArray,
+        length: float,
+        spec: PackingSpec,
+        gravity: float = GRAVITY,
     ):
         """Start from positions (n, 3) m, velocities (n, 3) m/s and radii (n,) m; every sphere is in the bed."""
+        self.gravity = gravity
         n = radius.size
         self.spec, self.length, self.total = spec, length, n
         self.frictional = spec.friction > 0.0
@@ -172,7 +179,7 @@ class Bed:
     def fallen(self, step: int) -> float:
         """Distance an airborne sphere has fallen after ``step`` steps, m."""
         t = step * self.spec.time_step
-        return self.spec.settling_velocity * t + 0.5 * GRAVITY * t * t
+        return self.spec.settling_velocity * t + 0.5 * self.gravity * t * t
 
     def advance(self, steps: int) -> None:
         """Advance by ``steps`` time steps; afterwards the forces at the positions are known."""
@@ -214,7 +221,7 @@ class Bed:
             pairs.spring,
             self.reference[:n],
             self.length,
-            GRAVITY,
+            self.gravity,
             spec.cohesion,
             spec.friction,
             spec.time_step,
@@ -236,7 +243,7 @@ class Bed:
             return
         self.position[first:last, 2] -= self.fallen(self.step)
         # velocities are kept half a step back
-        self.velocity[first:last, 2] -= GRAVITY * (self.step - 0.5) * self.spec.time_step
+        self.velocity[first:last, 2] -= self.gravity * (self.step - 0.5) * self.spec.time_step
         self.count = last
         self.ready = False
 
@@ -331,7 +338,7 @@ class Bed:
         half = 0.0 if self.starting else 0.5 * self.spec.time_step
         velocity[:n] += half * self.force[:n] / self.mass[:n, None]
         position[n:, 2] -= self.fallen(self.step)
-        velocity[n:, 2] -= GRAVITY * self.step * self.spec.time_step
+        velocity[n:, 2] -= self.gravity * self.step * self.spec.time_step
         return position, velocity
 
     def state(self) -> tuple[FloatArray, FloatArray]:
@@ -340,6 +347,14 @@ class Bed:
         position[:, :2] %= self.length
         back = np.argsort(self.identity)
         return position[back], velocity[back]
+
+    def full_spin(self) -> FloatArray:
+        """Full-step angular velocities (n, 3), rad/s, in the order of the cloud."""
+        spin = self.spin.copy()
+        if self.frictional and not self.starting:
+            inertia = 0.4 * self.mass * self.radius**2
+            spin[: self.count] += (0.5 * self.spec.time_step * self.torque / inertia[:, None])[: self.count]
+        return spin[np.argsort(self.identity)]
 
     def record(self) -> tuple[float, float, float, float]:
         """Time s, mean height m, kinetic energy J, and the paper's sample porosity."""

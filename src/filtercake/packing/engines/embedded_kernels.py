@@ -111,18 +111,18 @@ def find_pairs(
             reach = r + largest[k] + skin
             across, layers = shape[k, 0], shape[k, 2]
             inverse = across / length
-            x0, x1 = int(math.floor((x - reach) * inverse)), int(math.floor((x + reach) * inverse))
-            y0, y1 = int(math.floor((y - reach) * inverse)), int(math.floor((y + reach) * inverse))
-            z0 = max(0, int(math.floor((z - reach) / cell_size[k])))
-            z1 = min(layers - 1, max(0, int(math.floor((z + reach) / cell_size[k]))))
+            x0, x1 = math.floor((x - reach) * inverse), math.floor((x + reach) * inverse)
+            y0, y1 = math.floor((y - reach) * inverse), math.floor((y + reach) * inverse)
+            z0 = max(0, math.floor((z - reach) / cell_size[k]))
+            z1 = min(layers - 1, max(0, math.floor((z + reach) / cell_size[k])))
             for cz in range(min(z0, layers - 1), z1 + 1):
                 for cy in range(y0, y1 + 1):
-                    wrap_y = int(math.floor(cy / across))
+                    wrap_y = math.floor(cy / across)
                     if wrap_y < -1 or wrap_y > 1:  # a sphere's own width away: never a contact
                         continue
                     row = offset[k] + (cz * across + (cy - wrap_y * across)) * across
                     for cx in range(x0, x1 + 1):
-                        wrap_x = int(math.floor(cx / across))
+                        wrap_x = math.floor(cx / across)
                         if wrap_x < -1 or wrap_x > 1:
                             continue
                         c = row + cx - wrap_x * across

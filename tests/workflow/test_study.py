@@ -1,0 +1,116 @@
+"""The tiny study end to end: what it leaves behind, and what an edit makes it redo."""
+
+import json
+import os
+from contextlib import contextmanager
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from filtercake.figures.catalogue import FIGURES
+from filtercake.study import REPLICATE_COLUMNS, SUMMARY_COLUMNS
+
+pytestmark = pytest.mark.liggghts
+
+AFTER_PACKING = {"replicates", "summary", "tables", "figure", "provenance"}
+
+
+def test_leaves_tables_figures_and_provenance(finished):
+    summary = pd.read_csv(finished.results / "summary.csv")
+    replicates = pd.read_csv(finished.results / "replicates.csv")
+    points = pd.read_csv(finished.results / "points.csv")
+    assert list(summary.columns) == list(SUMMARY_COLUMNS)
+    assert list(replicates.columns) == list(REPLICATE_COLUMNS)
+    assert len(points) == len(summary) == 5
+    assert len(replicates) == 10 and (replicates["status"] == "ok").all()
+    assert summary["porosity"].between(0.3, 0.55).all()
+    assert (summary["porosity_ci95"] > 0).all() and (summary["resistance_ci95_m_kg"] > 0).all()
+    means = replicates.groupby("point")["porosity"].mean()
+    assert np.allclose(summary.set_index("point")["porosity"], means[summary["point"]])
+    for table in ("table1", "table4", "comparison"):
+        assert (finished.results / "tables" / f"{table}.csv").stat().st_size > 0
+    drawn = {path.stem for path in (finished.results / "figures").glob("*.png")}
+    assert drawn == set(FIGURES) - {"sensitivity_poisson_restitution"}
+    assert all(path.with_suffix(".pdf").stat().st_size > 1000 for path in (finished.results / "figures").glob("*.png"))
+    record = json.loads((finished.results / "provenance.json").read_text())
+    assert record["packings"] == 10 and record["failed"] == 0 and len(record["seeds"]) == 10
+
+
+def test_friction_and_cohesion_share_their_clouds(finished):
+    replicates = pd.read_csv(finished.results / "replicates.csv")
+    seeds = replicates[replicates["csd"] == "bimodal"].groupby("replicate")["seed"].nunique()
+    assert (seeds == 1).all()
+    assert replicates["seed"].nunique() == 4  # two distributions, two replicates
+
+
+def test_says_where_the_figures_are_and_how_far_it_is(finished):
+    assert "figures in results/tiny/figures" in finished.output
+    assert "[10/10 packings" in finished.output
+
+
+def test_a_second_call_does_nothing(finished):
+    assert not finished.planned()
+
+
+@contextmanager
+def edited(path, change):
+    """Change a file and put it back, its time included."""
+    before, times = path.read_text(), path.stat()
+    path.write_text(change(before))
+    try:
+        yield
+    finally:
+        path.write_text(before)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+def commented(text):
+    return text + "\n# edited\n"
+
+
+@pytest.mark.parametrize(
+    ("file", "rules"),
+    [
+        ("src/filtercake/csd.py", {"csd", "packing", "points", *AFTER_PACKING}),
+        ("src/filtercake/packing/cloud.py", {"packing", "points", *AFTER_PACKING}),
+        ("liggghts_templates/packing.in.j2", {"packing", *AFTER_PACKING}),
+        ("src/filtercake/porosity.py", {"points", *AFTER_PACKING}),
+        ("src/filtercake/tables.py", {"tables", "provenance"}),
+        ("src/filtercake/figures/cross_section.py", {"figure", "provenance"}),
+        ("workflow/scripts/packing.py", {"packing", *AFTER_PACKING}),
+        ("workflow/scripts/summary.py", {"summary", "tables", "figure", "provenance"}),
+    ],
+)
+def test_an_edit_reruns_exactly_what_depends_on_it(finished, file, rules):
+    with edited(finished.root / file, commented):
+        planned = finished.planned()
+    assert set(planned) - {"all"} == rules
+    assert planned["packing"] in (0, 5)
+    if file.endswith("cross_section.py"):
+        assert planned["figure"] == 1
+    assert not finished.planned()
+
+
+def test_a_new_value_in_the_study_makes_only_the_new_points(finished):
+    study = finished.root / "config/test/tiny.yaml"
+    with edited(study, lambda text: text.replace("cohesion_kJ_m3: [0, 50]", "cohesion_kJ_m3: [0, 25, 50]")):
+        planned = finished.planned()
+    assert planned["packing"] == 2  # one per friction
+    assert planned["csd"] == 0
+    assert set(planned) - {"all"} == {"packing", "points", *AFTER_PACKING}
+
+
+def test_a_label_in_the_study_makes_no_packing(finished):
+    study = finished.root / "config/test/tiny.yaml"
+    with edited(study, lambda text: text.replace("50/50 wt% 30/50 um", "another label")):
+        planned = finished.planned()
+    assert set(planned) - {"all"} == {"tables", "figure", "provenance"}
+
+
+def test_an_edited_size_distribution_remakes_only_its_points(finished):
+    table = finished.root / "config/test/tiny.csv"
+    with edited(table, lambda text: text.replace("50,0.25", "50,0.20").replace("40,0.25", "40,0.30")):
+        planned = finished.planned()
+    assert planned["packing"] == 1
+    assert planned["csd"] == 1
