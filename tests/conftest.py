@@ -40,6 +40,13 @@ def liggghts() -> str:
     return executable
 
 
+@pytest.fixture(autouse=True)
+def _liggghts_or_skip(request: pytest.FixtureRequest) -> None:
+    """Skip tests marked ``liggghts`` where it is missing."""
+    if request.node.get_closest_marker("liggghts"):
+        request.getfixturevalue("liggghts")
+
+
 @pytest.fixture(scope="session")
 def pmma() -> Callable[[float], CrystalSizeDistribution]:
     """PMMA of 20 and 50 um; takes the volume fraction of the 20 um spheres."""

@@ -17,7 +17,7 @@ found = re.search(r"cohesionEnergyDensity peratomtypepair 1 ([0-9.]+)", deck)
 kind = float(found[1]) if found else 0.0
 if kind == 2.0:
     run = subprocess.Popen([{real!r}, *sys.argv[1:]])
-    import time; time.sleep(0.5)
+    import time; time.sleep(0.1)
     run.send_signal(signal.SIGTERM)
     sys.exit(run.wait())
 status = subprocess.call([{real!r}, *sys.argv[1:]])

@@ -13,12 +13,17 @@ TIME: Final = 1e-6
 """us in s."""
 MASS: Final = 1e-15
 """pg in kg."""
-VELOCITY: Final = LENGTH / TIME
-DENSITY: Final = MASS / LENGTH**3
-ACCELERATION: Final = LENGTH / TIME**2
-PRESSURE: Final = MASS / (LENGTH * TIME**2)
-"""Young's modulus and cohesion energy density alike: 1 pg/(um us2) = 1000 Pa."""
-ENERGY: Final = MASS * VELOCITY**2
+# written out, not computed from the three above: 50 kJ/m3 must be 50, not 49.999999999999993
+VELOCITY: Final = 1.0
+"""um/us in m/s."""
+DENSITY: Final = 1e3
+"""pg/um3 in kg/m3."""
+ACCELERATION: Final = 1e6
+"""um/us2 in m/s2."""
+PRESSURE: Final = 1e3
+"""pg/(um us2) in Pa; Young's modulus and cohesion energy density alike."""
+ENERGY: Final = 1e-15
+"""pg um2/us2 in J."""
 
 
 def number(value: float) -> str:
