@@ -97,14 +97,20 @@ def module_of(figure: str) -> str:
 
 def draw(figure: str, data: StudyData) -> Figure:
     """Draw a figure."""
+    from filtercake.figures import style
+
     module = importlib.import_module(f"filtercake.{module_of(figure)}")
-    drawn: Figure = module.draw(data)
+    with style.applied():
+        drawn: Figure = module.draw(data)
     return drawn
 
 
 def save(figure: Figure, png: Path, pdf: Path) -> None:
     """Save a figure as PNG (300 dpi) and PDF; no date inside, so that the same figure is the same file."""
-    with publish(png) as temporary:
-        figure.savefig(temporary, format="png", dpi=300)
-    with publish(pdf) as temporary:
-        figure.savefig(temporary, format="pdf", metadata={"CreationDate": None})
+    from filtercake.figures import style
+
+    with style.applied():
+        with publish(png) as temporary:
+            figure.savefig(temporary, format="png", dpi=300)
+        with publish(pdf) as temporary:
+            figure.savefig(temporary, format="pdf", metadata={"CreationDate": None})

@@ -1,1 +1,118 @@
+"""Picture of one packing: the exact circles in which a vertical plane cuts its spheres."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PatchCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from filtercake.figures import selection, style
+from filtercake.packing.result import Packing
+from filtercake.packing.slab import bed_height, interior_slab
+from filtercake.units import MICROMETRE, FloatArray
+
+if TYPE_CHECKING:
+    from filtercake.figures.catalogue import StudyData
+
+FEW_SIZES = 5
+"""Up to so many sizes are named in a legend; more take a colour bar."""
+
+
+def draw(data: StudyData) -> Figure:
+    """Draw the plane y = L/2 of the base point's first accepted packing."""
+    figure, (axes,) = style.panels(height=4.2)
+    axes.set_xlabel("x (µm)")
+    axes.set_ylabel("z (µm)")
+    point = selection.main_point(data)
+    if point is None:
+        style.nothing(axes, "no point at the base material")
+        return figure
+    found, note = selection.packings(data, str(point["point"]), most=1)
+    rows = data.summary[data.summary["point"] == point["point"]]
+    if not found:
+        style.nothing(axes, "no accepted packing at the base material")
+        style.footer(figure, rows, note)
+        return figure
+    replicate, packing = found[0]
+    _spheres(figure, axes, packing)
+    _levels(axes, packing)
+    style.legend(figure, [axes], columns=3)
+    what = f"replicate {replicate} of {selection.label(data, str(point['csd']))}, plane y = L/2"
+    style.footer(figure, rows, what, note)
+    return figure
+
+
+def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Circles in which the plane at ``y`` cuts the spheres, periodic images included.
+
+    Parameters
+    ----------
+    packing : Packing
+        The packing, periodic in x and y.
+    y : float
+        Where the plane is, m.
+
+    Returns
+    -------
+    centre : ndarray, shape (m, 2)
+        x and z of the circles' centres, m; the part of a circle beyond a side is drawn at the other.
+    cut_radius : ndarray, shape (m,)
+        Radii of the circles, m.
+    diameter : ndarray, shape (m,)
+        Diameters of the spheres, m.
+    """
+    length, position, radius = packing.length, packing.position, packing.radius
+    offset = position[:, 1] - y
+    offset -= length * np.round(offset / length)
+    cut = np.abs(offset) < radius
+    circle = np.sqrt(radius[cut] ** 2 - offset[cut] ** 2)
+    x, z, diameter = position[cut, 0], position[cut, 2], 2.0 * radius[cut]
+    parts = []
+    for shift in (-length, 0.0, length):
+        seen = (x + shift + circle > 0.0) & (x + shift - circle < length)
+        parts.append(np.column_stack([x[seen] + shift, z[seen], circle[seen], diameter[seen]]))
+    found = np.concatenate(parts)
+    return found[:, :2], found[:, 2], found[:, 3]
+
+
+def _spheres(figure: Figure, axes: Axes, packing: Packing) -> None:
+    centre, cut_radius, diameter = plane_circles(packing, 0.5 * packing.length)
+    sizes = np.unique(2.0 * packing.radius / MICROMETRE)
+    norm = Normalize(sizes[0], sizes[-1])
+    shades = colormaps["cividis"]
+    few = sizes.size <= FEW_SIZES
+    inks = {size: style.colour((5, 4, 2, 3, 1)[k]) for k, size in enumerate(sizes)} if few else {}
+    colours = [inks[size] if few else shades(norm(size)) for size in diameter / MICROMETRE]
+    circles = [Circle((x, z), r) for (x, z), r in zip(centre / MICROMETRE, cut_radius / MICROMETRE, strict=True)]
+    axes.add_collection(
+        PatchCollection(circles, facecolors=colours, edgecolors=style.INK, linewidths=0.35, gid="spheres")
+    )
+    if few:
+        for size, ink in inks.items():
+            axes.plot([], [], "o", color=ink, markeredgecolor=style.INK, markeredgewidth=0.4, label=f"{size:.4g} µm")
+    else:
+        figure.colorbar(ScalarMappable(norm, shades), ax=axes, label="Sphere diameter (µm)", shrink=0.8)
+    side = packing.length / MICROMETRE
+    axes.set_xlim(0.0, side)
+    highest = float((packing.position[:, 2] + packing.radius).max())
+    top = max(highest, bed_height(packing.position, packing.radius)) / MICROMETRE
+    axes.set_ylim(-0.02 * top, 1.02 * top)
+    axes.set_aspect("equal")
+
+
+def _levels(axes: Axes, packing: Packing) -> None:
+    slab = interior_slab(packing.position, packing.radius)
+    axes.axhline(0.0, color=style.INK, linewidth=1.6, label="floor", gid="floor")
+    for limit in (slab.lower, slab.upper):
+        axes.axhline(
+            limit / MICROMETRE, color=style.colour(1), linewidth=1.1, linestyle="--", label="interior slab", gid="slab"
+        )
+    height = bed_height(packing.position, packing.radius) / MICROMETRE
+    axes.axhline(height, color=style.INK, linewidth=0.9, linestyle=":", label="bed height", gid="height")

@@ -11,7 +11,7 @@ from filtercake.errors import PackingRejected
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.contacts import Contacts, find_contacts, floor_overlap, relative_overlap
 from filtercake.packing.result import SettledState
-from filtercake.packing.settling import StopRule, stopped_falling
+from filtercake.packing.settling import ENERGY_FRACTION, StopRule, stopped_falling
 from filtercake.packing.slab import bed_height, interior_slab, why_too_thin
 from filtercake.packing.spec import PackingSpec
 
@@ -21,6 +21,9 @@ OVERLAP_ALLOWANCE = 0.005
 """Overlap of the smaller diameter allowed on top, for the load a contact carries."""
 FIXED_LENGTH_TOLERANCE = 1e-3
 """Fall of porosity allowed over the last tenth of a run of fixed length."""
+
+STEADY_ENERGY = 0.8
+"""Kinetic energy of the last tenth over that of the last half above which it is no longer falling."""
 
 
 def overlap_limit(spec: PackingSpec) -> float:
@@ -61,10 +64,7 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
             "the contacts are too soft or the time step too long"
         )
     if not is_settled(state, rule):
-        reasons.append(
-            f"not settled after {state.steps:,} steps: porosity or kinetic energy was still falling; "
-            "raise packing.max_fall_times"
-        )
+        reasons.append(f"not settled after {state.steps:,} steps: {_why_unsettled(state)}")
     if state.dangerous_builds and _keeps_the_rule(state):
         reasons.append(f"{state.dangerous_builds} neighbour lists were built late; use a larger skin_um")
     too_thin = why_too_thin(interior_slab(state.position, state.radius), state.radius)
@@ -82,6 +82,18 @@ def is_settled(state: SettledState, rule: StopRule) -> bool:
     if _keeps_the_rule(state):
         return rule.settled_at(state.trajectory) is not None
     return stopped_falling(state.trajectory, FIXED_LENGTH_TOLERANCE)
+
+
+def _why_unsettled(state: SettledState) -> str:
+    """Tell a bed that needs more time from one that the time step keeps moving."""
+    energy = state.trajectory.kinetic_energy
+    earlier, last = energy[-energy.size // 2 :].mean(), energy[-max(1, energy.size // 10) :].mean()
+    if energy.size >= 20 and last > STEADY_ENERGY * earlier and last > ENERGY_FRACTION * energy.max():
+        return (
+            f"the kinetic energy stays at {last / energy.max():.1e} of its peak, which a too long time step feeds; "
+            "lower packing.time_step_rayleigh"
+        )
+    return "porosity or kinetic energy was still falling; raise packing.max_fall_times"
 
 
 def measurements(state: SettledState, contacts: Contacts, deepest: float) -> dict[str, Any]:

@@ -1,0 +1,103 @@
+"""What of a study a figure shows: its base points, their accepted packings, and the published values beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from filtercake.config import Published
+from filtercake.errors import PackingRejected
+from filtercake.packing.result import Packing, read_record
+from filtercake.study import base_rows
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from filtercake.figures.catalogue import StudyData
+
+
+def label(data: StudyData, csd: str) -> str:
+    """Name of a distribution for readers."""
+    known = data.study.csds.get(csd)
+    return (known.label if known else None) or csd
+
+
+def number(data: StudyData, csd: str) -> int:
+    """Place of a distribution in the study: it has the same colour in every figure."""
+    return list(data.study.csds).index(csd)
+
+
+def base_points(data: StudyData) -> pd.DataFrame:
+    """Summary rows at the base material, one per distribution that has one, in the study's order of distributions."""
+    rows = base_rows(data.study, data.summary)
+    return rows.sort_values("csd", key=lambda names: names.map(lambda csd: number(data, csd)), kind="stable")
+
+
+def main_point(data: StudyData) -> pd.Series[Any] | None:
+    """Find the base point of the distribution with the most points; None where no sweep visits the base material."""
+    rows = base_points(data)
+    if rows.empty:
+        return None
+    counts = rows["csd"].map(data.summary["csd"].value_counts())
+    return rows.iloc[int(np.argmax(counts.to_numpy()))]
+
+
+def varied(data: StudyData, free: tuple[str, ...], *names: str) -> list[tuple[str, pd.DataFrame]]:
+    """Distributions of which any of some properties varies, with their summary rows otherwise at the base material.
+
+    Parameters
+    ----------
+    data : StudyData
+        The study.
+    free : tuple of str
+        Properties that may differ from the base material.
+    *names : str
+        Properties of which one must vary.
+    """
+    rows = base_rows(data.study, data.summary, free)
+    by_csd = ((csd, rows[rows["csd"] == csd]) for csd in data.study.csds)
+    return [(csd, own) for csd, own in by_csd if any(own[name].nunique() > 1 for name in names)]
+
+
+def published(data: StudyData, csd: str, quantity: str) -> list[Published]:
+    """List the published values of a quantity for a distribution."""
+    return [value for value in data.study.published if (value.csd, value.quantity) == (csd, quantity)]
+
+
+def records(data: StudyData, point: str) -> tuple[list[tuple[int, dict[str, Any]]], str]:
+    """Read the records of a point's accepted packings, with their replicates, and a note on the unreadable ones."""
+    found, lost = [], 0
+    for replicate, npz in _accepted(data, point):
+        try:
+            found.append((replicate, read_record(npz.with_suffix(".json"))))
+        except PackingRejected:
+            lost += 1
+    return found, _note(lost)
+
+
+def packings(data: StudyData, point: str, most: int | None = None) -> tuple[list[tuple[int, Packing]], str]:
+    """Read a point's accepted packings (the first few), with their replicates, and a note on the unreadable ones."""
+    found: list[tuple[int, Packing]] = []
+    lost = 0
+    for replicate, npz in _accepted(data, point):
+        if len(found) == most:
+            break
+        try:
+            found.append((replicate, Packing.load(npz)))
+        except PackingRejected:
+            lost += 1
+    return found, _note(lost)
+
+
+def _accepted(data: StudyData, point: str) -> Iterator[tuple[int, Path]]:
+    rows = data.replicates
+    good = rows[(rows["point"] == point) & (rows["status"] == "ok")]
+    for replicate in sorted(good["replicate"].astype(int)):
+        yield replicate, data.packings / point / f"r{replicate}.npz"
+
+
+def _note(lost: int) -> str:
+    return f"{lost} packing{'' if lost == 1 else 's'} could not be read" if lost else ""

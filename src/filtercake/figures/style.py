@@ -1,0 +1,294 @@
+"""How every figure looks: sizes, colours, markers, and the parts that figures share."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib import style as mpl_style
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.transforms import ScaledTranslation
+
+from filtercake.config import Published
+from filtercake.units import FloatArray
+
+SINGLE, MEDIUM, DOUBLE = 3.5, 5.0, 7.0
+"""Widths of a figure, in: one column, one and a half, two."""
+
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
+"""Okabe and Ito's colours, told apart by colour-blind readers; yellow last, it is faint on white."""
+MARKERS = ("o", "^", "v", "P", "X", "<", ">")
+SHIFT = 3.0
+"""Points between series side by side."""
+CROSS_HEIGHT = 6.0
+"""Points between the crosses of failed points, one row per series."""
+ALL_FAILED = "all packings failed"
+FAILED = "failed"
+"""Marks artists that stand for points without an accepted packing."""
+INK, FAINT = "#222222", "#8c8c8c"
+PUBLISHED_MARKERS = {"simulation": "D", "measurement": "s"}
+PUBLISHED_WORDS = {"simulation": "simulated", "measurement": "measured"}
+
+POROSITY = "Porosity (–)"
+COHESION = "Cohesion energy density (kJ/m³)"
+
+ENGINES = {"liggghts": "LIGGGHTS", "liggghts_as_published": "LIGGGHTS (protocol as published)"}
+"""Names of engines for readers; one that is not listed keeps its own."""
+
+_RC: dict[str, Any] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "legend.fontsize": 7.0,
+    "legend.frameon": False,
+    "legend.handlelength": 1.8,
+    "legend.columnspacing": 1.2,
+    "legend.labelspacing": 0.35,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 4.5,
+    "pdf.fonttype": 42,  # text stays text
+    "svg.hashsalt": "filtercake",
+}
+
+
+@contextmanager
+def applied() -> Iterator[None]:
+    """Draw and save in the house style; saving too, because matplotlib makes some ticks only then."""
+    with mpl_style.context(_RC, after_reset=True):  # a reader's own matplotlibrc changes nothing
+        yield
+
+
+def panels(
+    count: int = 1,
+    *,
+    width: float = SINGLE,
+    height: float = 2.9,
+    columns: int = 1,
+    ratios: Sequence[float] | None = None,
+    sharex: bool = False,
+    sharey: bool = False,
+) -> tuple[Figure, list[Axes]]:
+    """Make a figure with a grid of panels, row by row.
+
+    Parameters
+    ----------
+    count : int
+        Panels.
+    width, height : float
+        Size of the whole figure, in.
+    columns : int
+        Panels side by side.
+    ratios : sequence of float, optional
+        Relative heights of the rows.
+    sharex, sharey : bool
+        Whether all panels have the same axis.
+    """
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    rows = -(-count // columns)
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey, height_ratios=ratios)
+    axes: list[Axes] = list(grid.flat)
+    for unused in axes[count:]:
+        unused.remove()
+    return figure, axes[:count]
+
+
+def colour(index: int) -> str:
+    """Colour of the n-th series."""
+    return PALETTE[index % len(PALETTE)]
+
+
+def marker(index: int) -> str:
+    """Marker of the n-th series."""
+    return MARKERS[index % len(MARKERS)]
+
+
+def shift(artists: Iterable[Artist], axes: Axes, place: int, count: int) -> None:
+    """Move one of several series sideways on the page, so that error bars are told apart; its data keep their x."""
+    points = (place - 0.5 * (count - 1)) * SHIFT
+    # set afterwards: matplotlib takes the limits of the axes from artists that are drawn at their data
+    moved = axes.transData + ScaledTranslation(points / 72.0, 0.0, axes.figure.dpi_scale_trans)
+    for artist in artists:
+        artist.set_transform(moved)
+
+
+def error_line(
+    axes: Axes, rows: pd.DataFrame, x: str, y: str, half: str, *, label: str, index: int, place: int = 0, count: int = 1
+) -> None:
+    """Plot a series of means with their intervals; points without a mean are crosses above the axes.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    rows : DataFrame
+        The points of the series, in order.
+    x, y, half : str
+        Columns of the abscissa, the means and the half-widths of their intervals.
+    label : str
+        Name of the series.
+    index : int
+        Chooses colour and marker.
+    place, count : int
+        Which of how many series side by side it is.
+    """
+    positions, means = rows[x].to_numpy(np.float64), rows[y].to_numpy(np.float64)
+    good = np.isfinite(means)
+    drawn = axes.errorbar(
+        positions[good],
+        means[good],
+        yerr=rows[half].to_numpy(np.float64)[good],
+        color=colour(index),
+        marker=marker(index),
+        capsize=2.0,
+        elinewidth=0.8,
+        label=label,
+        zorder=3,
+    )
+    shift(drawn.get_children(), axes, place, count)
+    failed = positions[~good]
+    if failed.size:
+        edge = axes.get_xaxis_transform()
+        (crosses,) = axes.plot(
+            failed, np.ones(failed.size), "x", color=colour(index), transform=edge, clip_on=False, gid=FAILED
+        )
+        height = CROSS_HEIGHT * (place + 1) / 72.0
+        crosses.set_transform(edge + ScaledTranslation(0.0, height, axes.figure.dpi_scale_trans))
+
+
+def title(axes: Axes, text: str, series: int) -> None:
+    """Put a panel's title over it, and over the crosses of its failed points where there are any."""
+    failed = any(line.get_gid() == FAILED for line in axes.get_lines())
+    axes.set_title(text, loc="left", pad=CROSS_HEIGHT * (series + 1) if failed else None)
+
+
+def published_label(value: Published) -> str:
+    """Legend entry of a published value: its source and whether it was simulated or measured."""
+    return f"{value.source}, {PUBLISHED_WORDS[value.kind]}"
+
+
+def published_point(axes: Axes, x: float, y: float, value: Published, *, fill: str = "white", label: str = "") -> None:
+    """Plot a published value as a marker of its kind, named by its source unless a label is given."""
+    axes.plot(
+        [x],
+        [y],
+        PUBLISHED_MARKERS[value.kind],
+        markerfacecolor=fill,
+        markeredgecolor=INK,
+        markeredgewidth=0.9,
+        clip_on=False,
+        label=label or published_label(value),
+        zorder=5,
+        gid="published",
+    )
+
+
+def published_level(axes: Axes, value: Published) -> None:
+    """Plot a published value that belongs to no abscissa as a horizontal line."""
+    dashes = (0, (4, 2)) if value.kind == "simulation" else (0, (1, 1.5))
+    axes.axhline(
+        value.value, color=INK, linewidth=0.9, linestyle=dashes, label=published_label(value), zorder=1, gid="published"
+    )
+
+
+def resistance_axis(axes: Axes, values: FloatArray, *, log: bool = False, factor: str = "") -> None:
+    """Label the y axis as specific cake resistance in a power of ten of m/kg; the data stay in m/kg.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    values : ndarray
+        What is shown; the largest finite one chooses the power of ten.
+    log : bool
+        Whether the axis is logarithmic.
+    factor : str
+        Words before the unit.
+    """
+    finite = values[np.isfinite(values)]
+    exponent = int(np.floor(np.log10(finite.max()))) if finite.size else 9
+    if log:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
+    power = str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    axes.set_ylabel(f"Specific cake resistance{factor} (10{power} m/kg)")
+
+
+def legend(figure: Figure, axes: Iterable[Axes], columns: int = 2, extra: Sequence[Artist] = ()) -> None:
+    """Put one legend of all panels above them, where it covers no data; equal labels appear once."""
+    entries: dict[str, Artist] = {}
+    for panel in axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+        if any(line.get_gid() == FAILED for line in panel.get_lines()):
+            extra = [*extra, key(ALL_FAILED, color=FAINT, marker="x", linewidth=0.0)]
+    for handle in extra:
+        entries.setdefault(str(handle.get_label()), handle)
+    # sorted() keeps the order within both kinds: our series come first
+    shown = sorted(entries.items(), key=lambda entry: not isinstance(entry[1], ErrorbarContainer))
+    if shown:
+        figure.legend(
+            [handle for _, handle in shown], [name for name, _ in shown], loc="outside upper left", ncols=columns
+        )
+
+
+def key(label: str, **properties: Any) -> Line2D:
+    """Entry of a legend that stands for no single artist."""
+    return Line2D([], [], label=label, **properties)
+
+
+def footer(figure: Figure, rows: pd.DataFrame, *notes: str) -> None:
+    """Say below a figure how many packings it shows, how many failed and what made them.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    rows : DataFrame
+        The rows of the summary it shows.
+    *notes : str
+        What else there is to say.
+    """
+    parts = [describe_counts(rows), *notes] if len(rows) else list(notes)
+    characters = int(figure.get_figwidth() * 21.0)
+    text = "\n".join(textwrap.wrap("; ".join(part for part in parts if part), characters))
+    figure.supxlabel(text, x=0.012, ha="left", fontsize=6.0, color="#555555", linespacing=1.3)
+
+
+def describe_counts(rows: pd.DataFrame) -> str:
+    """Count the packings of some points: how many each, how many failed, and the engine's name."""
+    least, most, failed = int(rows["n"].min()), int(rows["n"].max()), int(rows["n_failed"].sum())
+    each = f"n = {least}" if least == most else f"n = {least} to {most}"
+    per_point = " per point" if len(rows) > 1 else ""
+    engines = ", ".join(ENGINES.get(name, name) for name in sorted(set(rows["engine"].astype(str))))
+    return f"{each} packing{'' if most == 1 else 's'}{per_point}, {failed or 'none'} failed; {engines}"
+
+
+def nothing(axes: Axes, reason: str) -> None:
+    """Say in the middle of empty axes why there is nothing to see."""
+    sentence = "\n".join(textwrap.wrap(reason, 38))
+    plate = {"facecolor": "white", "edgecolor": "none"}
+    axes.text(0.5, 0.5, sentence, transform=axes.transAxes, ha="center", va="center", color=FAINT, bbox=plate, zorder=9)
