@@ -210,6 +210,15 @@ class Published(Model):
     kind: Literal["simulation", "measurement"] = Field(description="Simulated or measured.")
     cohesion_kJ_m3: Cohesion | None = Field(default=None, description="At this cohesion, kJ/m3.")  # noqa: N815
     friction: Friction | None = Field(default=None, description="At this friction.")
+    low: Number | None = Field(default=None, description="Lower end, where only a range is known.")
+    high: Number | None = Field(default=None, description="Upper end, where only a range is known.")
+
+    @model_validator(mode="after")
+    def _range(self) -> Published:
+        ends = (self.low, self.high)
+        if ends != (None, None) and (None in ends or not float(self.low or 0) <= self.value <= float(self.high or 0)):
+            raise ValueError("low and high go together, with the value between them")
+        return self
 
 
 class Study(Model):

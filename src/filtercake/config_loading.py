@@ -331,7 +331,7 @@ def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> 
 
 def _over_cohesion(limit: float, modulus: float, poisson: float) -> str:
     return (
-        f"must be at most {math.floor(limit)} kJ/m3 at E = {modulus / MEGAPASCAL:g} MPa and nu = {poisson:g}: above it, "
+        f"must be at most {math.floor(limit)} kJ/m3 at E = {modulus / MEGAPASCAL:g} MPa, nu = {poisson:g}: above it, "
         f"contacts overlap by more than {LARGEST_RELATIVE_OVERLAP:.1%} of the diameter; use a larger youngs_modulus_MPa"
     )
 

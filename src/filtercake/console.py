@@ -21,21 +21,11 @@ Points = Mapping[str, Mapping[str, Point]]
 """Points by study and name."""
 
 
-def packings_left(results: Path, points: Points) -> int:
-    """Packings of points that are not finished yet."""
-    return sum(
-        point.replicates
-        for study, group in points.items()
-        for point in group.values()
-        if not (results / study / "packings" / point.name / MANIFEST).exists()
-    )
-
-
-def plan(points: Points, left: int) -> str:
+def plan(points: Points, packings: int) -> str:
     """One line about what a run is about to do."""
     engines = sorted({point.spec.engine for group in points.values() for point in group.values()})
     total = sum(len(group) for group in points.values())
-    return f"filtercake: {', '.join(points)}: {total} points, {left} packings to make with {', '.join(engines)}"
+    return f"filtercake: {', '.join(points)}: {total} points, {packings} packings to make with {', '.join(engines)}"
 
 
 def failed_packings(folder: Path, points: Iterable[str]) -> Iterator[tuple[str, int, str]]:

@@ -85,7 +85,7 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
                 "porosity_as_published_ci95": point["porosity_as_published_ci95"],
                 "porosity": point["porosity"],
                 "porosity_ci95": point["porosity_ci95"],
-                "resistance_measured_m_kg": _value(published_value(study, name, "resistance_m_kg", "measurement")),
+                **_measured_resistance(published_value(study, name, "resistance_m_kg", "measurement")),
                 "resistance_published_m_kg": _value(published_value(study, name, "resistance_m_kg", "simulation")),
                 "resistance_as_published_m_kg": (
                     kozeny_carman(as_published, full, material.density_kg_m3, material.sphericity)
@@ -104,6 +104,16 @@ def _base_point(study: Study, csd: str, summary: pd.DataFrame) -> pd.Series[Any]
     """Row of a distribution at the study's base material, None where no sweep visits it."""
     found = base_rows(study, summary[summary["csd"] == csd])
     return None if found.empty else found.iloc[0]
+
+
+def _measured_resistance(published: Published | None) -> dict[str, float]:
+    """Return a measured resistance, or the range where only that is known."""
+    names = ("resistance_measured_m_kg", "resistance_measured_low_m_kg", "resistance_measured_high_m_kg")
+    if published is None:
+        return dict.fromkeys(names, np.nan)
+    if published.low is None or published.high is None:
+        return dict(zip(names, (published.value, np.nan, np.nan), strict=True))
+    return dict(zip(names, (np.nan, published.low, published.high), strict=True))
 
 
 def _value(published: Published | None) -> float:

@@ -192,7 +192,9 @@ def test_two_mpi_processes_agree(
 
 
 @pytest.mark.liggghts
-def test_pictures_are_kept_when_asked_for(spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path) -> None:
+def test_pictures_are_kept_when_asked_for(
+    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+) -> None:
     (outcome,) = pack_replicates(dataclasses.replace(spec, write_vtk=True), small_csd, 1, tmp_path, "code")
     assert outcome.status == "ok", outcome.reason
     pictures = sorted((tmp_path / "r0.vtk").iterdir())
@@ -244,7 +246,15 @@ def deck(request: SettleRequest, fake: Callable[[str], Path], engine: Liggghts |
 
 def test_a_smooth_dry_scene_computes_neither_friction_nor_cohesion(spec: PackingSpec, ask: Any, fake: Any) -> None:
     text = deck(ask(dataclasses.replace(spec, friction=0.0, cohesion=0.0)), fake)
-    for word in ("tangential", "coefficientFriction", "cohesion", "sjkr", "nve/sphere", "contact_distance_factor", "vtk"):
+    for word in (
+        "tangential",
+        "coefficientFriction",
+        "cohesion",
+        "sjkr",
+        "nve/sphere",
+        "contact_distance_factor",
+        "vtk",
+    ):
         assert word not in text
     assert "pair_style      gran model hertz\n" in text
     assert "fix integrate   all nve\n" in text
@@ -383,8 +393,13 @@ def test_a_missing_template_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.skipif(not shutil.which("mpirun"), reason="mpirun is not installed"))])
-@pytest.mark.parametrize(("sign", "says"), [(signal.SIGTERM, "signal"), (signal.SIGKILL, "signal|ended with status 137")])
+@pytest.mark.parametrize(
+    "processes",
+    [1, pytest.param(2, marks=pytest.mark.skipif(not shutil.which("mpirun"), reason="mpirun is not installed"))],
+)
+@pytest.mark.parametrize(
+    ("sign", "says"), [(signal.SIGTERM, "signal"), (signal.SIGKILL, "signal|ended with status 137")]
+)
 def test_a_killed_liggghts_may_be_tried_again(
     make_spec: Callable[..., PackingSpec], ask: Any, sign: signal.Signals, says: str, processes: int
 ) -> None:
@@ -479,7 +494,9 @@ LIARS = [
     pytest.param(
         f"{FINISHED}; {CLOUD_AS_DUMP} | head -n 60 > final.dump", "promises 100 atoms but holds 51", 3, id="half a dump"
     ),
-    pytest.param(f"{FINISHED}; {CLOUD_AS_DUMP} > final.dump", "not settled after 10 steps", 1, id="leaves it in the air"),
+    pytest.param(
+        f"{FINISHED}; {CLOUD_AS_DUMP} > final.dump", "not settled after 10 steps", 1, id="leaves it in the air"
+    ),
     pytest.param(
         f"{FINISHED}; {CLOUD_AS_DUMP} | sed '12s/ 0 0 0 / nan 0 0 /' > final.dump",
         "1 velocity values of the final state are not finite",
@@ -497,7 +514,13 @@ LIARS = [
 
 @pytest.mark.parametrize(("script", "says", "attempts"), LIARS)
 def test_a_program_that_is_not_liggghts_is_found_out(
-    fake: Any, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path, script: str, says: str, attempts: int
+    fake: Any,
+    spec: PackingSpec,
+    small_csd: CrystalSizeDistribution,
+    tmp_path: Path,
+    script: str,
+    says: str,
+    attempts: int,
 ) -> None:
     import re
 

@@ -96,7 +96,9 @@ def test_one_value_is_a_list_of_one(study_from, good_study: str) -> None:
 
 def test_a_file_is_looked_up_beside_the_study_and_truncated(study_from, tmp_path: Path, good_study: str) -> None:
     (tmp_path / "own.csv").write_text("size_um,volume_fraction\n20,0.001\n50,0.999\n", encoding="utf-8")
-    text = good_study.replace("    mixture:\n" + MIXTURE, "    file: own.csv\n    truncate_below_volume_fraction: 0.01\n")
+    text = good_study.replace(
+        "    mixture:\n" + MIXTURE, "    file: own.csv\n    truncate_below_volume_fraction: 0.01\n"
+    )
     csd = study_from(text).csds["bimodal"]
     assert csd.full.size.size == 2
     assert csd.truncated.size.tolist() == pytest.approx([50e-6])
@@ -137,7 +139,12 @@ BROKEN: list[tuple[Any, ...]] = [
         id="unknown in a list",
     ),
     pytest.param(
-        "density_kg_m3: 1180", "density_kg_m3: heavy", "material.density_kg_m3", "'heavy'", "must be a number", id="text"
+        "density_kg_m3: 1180",
+        "density_kg_m3: heavy",
+        "material.density_kg_m3",
+        "'heavy'",
+        "must be a number",
+        id="text",
     ),
     pytest.param(
         "density_kg_m3: 1180",
@@ -172,7 +179,9 @@ BROKEN: list[tuple[Any, ...]] = [
         "must be a valid number",
         id="empty value",
     ),
-    pytest.param("  density_kg_m3: 1180", "  friction: 0", "material.density_kg_m3", "(missing)", "must be given", id="-"),
+    pytest.param(
+        "  density_kg_m3: 1180", "  friction: 0", "material.density_kg_m3", "(missing)", "must be given", id="-"
+    ),
     pytest.param(
         "size_um: 20", "size_um: -20", "csds.bimodal.mixture[0].size_um", "-20", "must be greater than 0", id="negative"
     ),
@@ -188,9 +197,16 @@ BROKEN: list[tuple[Any, ...]] = [
         id="fractions",
     ),
     pytest.param(
-        "  - csd: bimodal", "  - csd: bimodel", "sweeps[0].csd[0]", "'bimodel'", "not in csds; allowed: bimodal; did", id="c"
+        "  - csd: bimodal",
+        "  - csd: bimodel",
+        "sweeps[0].csd[0]",
+        "'bimodel'",
+        "not in csds; allowed: bimodal; did",
+        id="c",
     ),
-    pytest.param("sweeps:\n  - csd: bimodal", "sweeps: []", "sweeps", "[]", "must hold at least one value", id="no sweep"),
+    pytest.param(
+        "sweeps:\n  - csd: bimodal", "sweeps: []", "sweeps", "[]", "must hold at least one value", id="no sweep"
+    ),
     pytest.param(
         "  - csd: bimodal",
         "  - csd: bimodal\n    friction: []",
@@ -232,7 +248,9 @@ BROKEN: list[tuple[Any, ...]] = [
         "overlap by more than 3.5% of the diameter; use a larger youngs_modulus_MPa",
         id="base cohesion over the limit",
     ),
-    pytest.param("  bimodal:", "  ../bimodal:", "csds.../bimodal", "'../bimodal'", "must be letters, digits", id="path"),
+    pytest.param(
+        "  bimodal:", "  ../bimodal:", "csds.../bimodal", "'../bimodal'", "must be letters, digits", id="path"
+    ),
     pytest.param("  bimodal:", "  5:", "csds[5]", "5", "must be letters, digits", id="name that is a number"),
     pytest.param(
         "    label: half and half",
@@ -458,7 +476,9 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
 
 
 scalars = st.none() | st.booleans() | st.integers(-10, 10**6) | st.floats(allow_infinity=False) | st.text(max_size=6)
-keys = st.sampled_from([*Study.model_fields, "size_um", "csd", "mixture", "particles", "friction"]) | st.text(max_size=4)
+keys = st.sampled_from([*Study.model_fields, "size_um", "csd", "mixture", "particles", "friction"]) | st.text(
+    max_size=4
+)
 trees = st.recursive(scalars, lambda t: st.lists(t, max_size=3) | st.dictionaries(keys, t, max_size=4), max_leaves=12)
 
 
@@ -576,7 +596,9 @@ def test_a_wrong_path_of_liggghts_is_named(
         engine_choice.check([study_from(with_packing(good_study, "engine: liggghts"))])
 
 
-def test_every_study_without_its_engine_is_named(nowhere: Path, write_study: Callable[..., Path], good_study: str) -> None:
+def test_every_study_without_its_engine_is_named(
+    nowhere: Path, write_study: Callable[..., Path], good_study: str
+) -> None:
     text = with_packing(good_study, "engine: liggghts")
     studies = load_studies([write_study(text, "one.yaml"), write_study(text, "two.yaml")])
     with pytest.raises(ConfigError) as caught:

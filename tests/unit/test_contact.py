@@ -38,9 +38,7 @@ def test_effective_radius_is_symmetric_and_below_both(a: float, b: float) -> Non
     assert contact.effective_radius(a, 1e9) == pytest.approx(contact.effective_radius(a, math.inf), rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("diameter_um", "density", "microseconds"), [(20.0, 1180.0, 0.822), (32.5, 2450.0, 1.92)]
-)
+@pytest.mark.parametrize(("diameter_um", "density", "microseconds"), [(20.0, 1180.0, 0.822), (32.5, 2450.0, 1.92)])
 def test_rayleigh_time_steps_of_the_paper(diameter_um: float, density: float, microseconds: float) -> None:
     step = contact.rayleigh_time_step(0.5e-6 * diameter_um, density, E, NU)
     assert step * 1e6 == pytest.approx(microseconds, rel=0.003)  # three figures printed

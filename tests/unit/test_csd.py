@@ -351,7 +351,9 @@ def test_a_bad_csv_is_refused_with_its_name(tmp_path: Path, text: str, says: str
     assert message.count(str(path)) == 1
 
 
-@pytest.mark.parametrize("content", [bytes(range(256)) * 8, b"\x89PNG\r\n\x1a\n\x00\x00", b"\x00" * 64, b"\xff\xfe" * 40])
+@pytest.mark.parametrize(
+    "content", [bytes(range(256)) * 8, b"\x89PNG\r\n\x1a\n\x00\x00", b"\x00" * 64, b"\xff\xfe" * 40]
+)
 def test_a_binary_file_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "user.csv"
     path.write_bytes(content)
@@ -366,7 +368,9 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
         read_csd(tmp_path)
 
 
-@pytest.mark.xfail(strict=True, reason="src: a row with more cells than the header is read as if the rest were not there")
+@pytest.mark.xfail(
+    strict=True, reason="src: a row with more cells than the header is read as if the rest were not there"
+)
 def test_unquoted_decimal_commas_are_never_read_as_another_distribution(tmp_path: Path) -> None:
     # 20,1 and 50,0 um with 100 % and 0 %... meant: 20.1 um 0.5, 50.0 um 0.5
     path = tmp_path / "user.csv"

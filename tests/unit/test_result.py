@@ -16,7 +16,9 @@ from filtercake.packing.result import Packing, publish, read_record, sha256, wri
 @pytest.fixture
 def packing() -> Packing:
     rng = np.random.default_rng(1)
-    return Packing(rng.random((50, 3)) * 1e-4, rng.random(50) * 1e-5, 1.2345678901234567e-4, {"steps": 7, "seed": 2**62})
+    return Packing(
+        rng.random((50, 3)) * 1e-4, rng.random(50) * 1e-5, 1.2345678901234567e-4, {"steps": 7, "seed": 2**62}
+    )
 
 
 def others(folder: Path) -> set[str]:

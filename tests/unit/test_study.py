@@ -241,7 +241,9 @@ def test_points_that_differ_in_the_contact_share_their_clouds(make_spec, pmma, c
 def test_clouds_differ_by_replicate_distribution_number_void_fraction_and_base_seed(make_spec, pmma) -> None:
     seeds = [cloud_seed(make_spec(), pmma(0.5), k) for k in range(100)]
     seeds += [cloud_seed(make_spec(), pmma(0.25), k) for k in range(100)]
-    seeds += [cloud_seed(make_spec(**c), pmma(0.5), 0) for c in ({"particles": 301}, {"void_fraction": 0.7}, {"seed": 2})]
+    seeds += [
+        cloud_seed(make_spec(**c), pmma(0.5), 0) for c in ({"particles": 301}, {"void_fraction": 0.7}, {"seed": 2})
+    ]
     assert len(set(seeds)) == 203
 
 

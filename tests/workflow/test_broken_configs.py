@@ -14,13 +14,21 @@ BROKEN = {
     ),
     "unreadable csv": ("file: tiny.csv", "file: nowhere.csv", ["csds.from_file.file", "nowhere.csv", "cannot be read"]),
     "empty sweep": ("cohesion_kJ_m3: [0, 50]", "cohesion_kJ_m3: []", ["sweeps[1].cohesion_kJ_m3", "at least"]),
-    "cohesion": ("cohesion_kJ_m3: [0, 50]", "cohesion_kJ_m3: [0, 400]", ["sweeps[1].cohesion_kJ_m3[1]", "400", "at most 206"]),
+    "cohesion": (
+        "cohesion_kJ_m3: [0, 50]",
+        "cohesion_kJ_m3: [0, 400]",
+        ["sweeps[1].cohesion_kJ_m3[1]", "400", "at most 206"],
+    ),
     "time step": (
         "packing:\n",
         "packing:\n  time_step_us: 5\n",
         ["packing.time_step_us", "= 5", "below the Rayleigh time step 1.23"],
     ),
-    "no such distribution": ("csd: [bimodal, from_file]", "csd: [bimodul]", ["sweeps[0].csd[0]", "did you mean bimodal?"]),
+    "no such distribution": (
+        "csd: [bimodal, from_file]",
+        "csd: [bimodul]",
+        ["sweeps[0].csd[0]", "did you mean bimodal?"],
+    ),
 }
 
 

@@ -42,7 +42,6 @@ except FiltercakeError as error:
     stop(error)
 
 RESULTS = settings.results
-PACKINGS_LEFT = console.packings_left(Path(RESULTS), POINTS)
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
 
 
@@ -105,9 +104,16 @@ def packing_minutes(wildcards, attempt):
     return min(10_080, attempt * max(30, point_of(wildcards).spec.particles // 100))
 
 
+def packings_to_make():
+    """Packings of the jobs that are about to run."""
+    jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name == "packing"]
+    return sum(point_of(job.wildcards).replicates for job in jobs)
+
+
 def begin_run():
-    Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), PACKINGS_LEFT)
+    to_make = packings_to_make()
+    Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), to_make)
     for study in STUDIES.values():
         for warning in study.warnings:
             print(f"warning: {warning}", file=sys.stderr)
-    print(console.plan(POINTS, PACKINGS_LEFT), file=sys.stderr)
+    print(console.plan(POINTS, to_make), file=sys.stderr)

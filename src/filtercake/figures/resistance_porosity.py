@@ -51,6 +51,8 @@ def draw(data: StudyData) -> Figure:
     notes = ["curves: eq. 3 with the full distribution"]
     if any(line.get_gid() == "published" and np.min(line.get_ydata()) == 0.0 for line in axes.get_lines()):
         notes.append("markers on the abscissa: no resistance published")
+    if any(value.low is not None for name in names for value in selection.published(data, name, "resistance_m_kg")):
+        notes.append("dotted: only a range is published")
     if rows.empty:
         notes.append("no point at the base material")
     style.footer(figure, rows, *notes)
@@ -94,11 +96,15 @@ def _ours(axes: Axes, data: StudyData, row: pd.Series[Any]) -> None:
 
 def _published(axes: Axes, data: StudyData, csd: str) -> list[Line2D]:
     """Plot published pairs, a porosity without its resistance on the abscissa; return their legend entries."""
-    resistances = {_origin(value): value.value for value in selection.published(data, csd, "resistance_m_kg")}
+    resistances = {_origin(value): value for value in selection.published(data, csd, "resistance_m_kg")}
     keys = []
     for value in selection.published(data, csd, "porosity"):
-        resistance = resistances.get(_origin(value), 0.0)
-        style.published_point(axes, value.value, resistance, value, fill=_ink(data, csd), label="_")
+        resistance = resistances.get(_origin(value))
+        if resistance is not None and resistance.low is not None and resistance.high is not None:
+            style.published_range(axes, value.value, resistance.low, resistance.high, colour=_ink(data, csd))
+        else:
+            height = resistance.value if resistance is not None else 0.0
+            style.published_point(axes, value.value, height, value, fill=_ink(data, csd), label="_")
         shape, label = style.PUBLISHED_MARKERS[value.kind], style.published_label(value)
         keys.append(style.key(label, marker=shape, color=style.FAINT, markeredgecolor=style.INK, linewidth=0.0))
     return keys

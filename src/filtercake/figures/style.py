@@ -42,7 +42,11 @@ PUBLISHED_WORDS = {"simulation": "simulated", "measurement": "measured"}
 POROSITY = "Porosity (–)"
 COHESION = "Cohesion energy density (kJ/m³)"
 
-ENGINES = {"liggghts": "LIGGGHTS", "liggghts_as_published": "LIGGGHTS (protocol as published)"}
+ENGINES = {
+    "liggghts": "LIGGGHTS",
+    "liggghts_as_published": "LIGGGHTS (protocol as published)",
+    "embedded": "embedded engine",
+}
 """Names of engines for readers; one that is not listed keeps its own."""
 
 _RC: dict[str, Any] = {
@@ -204,8 +208,24 @@ def published_point(axes: Axes, x: float, y: float, value: Published, *, fill: s
     )
 
 
+def published_range(axes: Axes, x: float, low: float, high: float, *, colour: str) -> None:
+    """Plot a published value of which only a range is known as a bracket."""
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    bars = axes.errorbar([x], [middle], yerr=[half], fmt="none", ecolor=colour, elinewidth=1.2, capsize=4, zorder=4)
+    for artist in bars.get_children():
+        artist.set_gid("published")
+    for segments in bars[2]:
+        segments.set_linestyle(":")
+
+
 def published_level(axes: Axes, value: Published) -> None:
-    """Plot a published value that belongs to no abscissa as a horizontal line."""
+    """Plot a published value that belongs to no abscissa: a horizontal line, or a band where only a range is known."""
+    if value.low is not None and value.high is not None:
+        label = f"{published_label(value)} (range)"
+        axes.axhspan(
+            value.low, value.high, color=FAINT, alpha=0.25, linewidth=0, label=label, zorder=0, gid="published"
+        )
+        return
     dashes = (0, (4, 2)) if value.kind == "simulation" else (0, (1, 1.5))
     axes.axhline(
         value.value, color=INK, linewidth=0.9, linestyle=dashes, label=published_label(value), zorder=1, gid="published"
