@@ -33,6 +33,8 @@ from filtercake.porosity import measure
 
 UM = 1e-6
 
+needs_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun is not installed")
+
 
 @pytest.fixture(scope="module")
 def spec(make_spec: Callable[..., PackingSpec]) -> PackingSpec:
@@ -154,17 +156,31 @@ def test_the_spheres_stay_in_the_order_of_the_cloud(packed: Packing, small_csd: 
 
 @pytest.mark.liggghts
 def test_without_friction_the_tangential_part_is_exactly_nothing(
-    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    templates: Path, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
-    porosity = {}
+    # contact_distance_factor lists more pairs, so that forces are summed in another order: without it, all is equal
+    spoil(templates, " contact_distance_factor 1.2", "")
+    made = {}
     for tangential in (False, True):
         folder = tmp_path / str(tangential)
         folder.mkdir()
-        engine = Liggghts(force_tangential=tangential)
-        made = pack(spec, small_csd, 0, folder, engine=engine)
+        made[tangential] = pack(spec, small_csd, 0, folder, engine=Liggghts(force_tangential=tangential))
         assert ("tangential history" in (folder / "packing.in").read_text(encoding="utf-8")) == tangential
-        porosity[tangential] = measure(made, spec).interior
-    assert porosity[True] == pytest.approx(porosity[False], abs=1e-12)
+    assert np.array_equal(made[True].position, made[False].position)
+    assert measure(made[True], spec).interior == pytest.approx(measure(made[False], spec).interior, abs=1e-12)
+
+
+@pytest.mark.liggghts
+def test_without_friction_the_tangential_deck_differs_by_rounding_only(
+    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+) -> None:
+    porosity = []
+    for tangential in (False, True):
+        folder = tmp_path / str(tangential)
+        folder.mkdir()
+        porosity.append(measure(pack(spec, small_csd, 0, folder, engine=Liggghts(force_tangential=tangential)), spec))
+    # rounding grows in a chaotic fall; 1e-10 seen with 100 spheres, 3e-7 with 300
+    assert porosity[1].interior == pytest.approx(porosity[0].interior, abs=1e-5)
 
 
 @pytest.mark.liggghts
@@ -179,7 +195,7 @@ def test_friction_makes_a_looser_bed(spec: PackingSpec, small_csd: CrystalSizeDi
 
 
 @pytest.mark.liggghts
-@pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun is not installed")
+@needs_mpirun
 def test_two_mpi_processes_agree(
     packed: Packing, make_spec: Callable[..., PackingSpec], small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
@@ -211,7 +227,8 @@ def test_the_published_protocol_runs_and_is_accepted(
     made = pack(dataclasses.replace(spec, engine="liggghts_as_published"), small_csd, 0, tmp_path)
     assert made.diagnostics["engine"] == "liggghts_as_published"
     assert made.diagnostics["steps"] == 30_001  # one step inserts
-    assert made.diagnostics["particles"] == pytest.approx(100, abs=3)  # it draws its own spheres, to a volume
+    # it draws its own spheres, and LIGGGHTS inserts fewer than asked (physics.md, trap 4): 77 of 100 here
+    assert 50 <= made.diagnostics["particles"] <= 110
     assert 0.3 < measure(made, spec).interior < 0.5
 
 
@@ -367,7 +384,7 @@ def test_a_wrong_argument_reaches_the_user_too(templates: Path, spec: PackingSpe
 def test_lost_spheres_are_an_error_not_a_smaller_packing(templates: Path, spec: PackingSpec, ask: Any) -> None:
     # without a floor every sphere falls out of the box
     spoil(templates, "fix floor ", "# fix floor ")
-    with pytest.raises(EngineError, match="[Ll]ost atoms"):
+    with pytest.raises(EngineError, match=r"[Ll]ost atoms"):
         Liggghts().settle(ask(spec))
 
 
@@ -394,22 +411,26 @@ def test_a_missing_template_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.liggghts
 @pytest.mark.parametrize(
-    "processes",
-    [1, pytest.param(2, marks=pytest.mark.skipif(not shutil.which("mpirun"), reason="mpirun is not installed"))],
-)
-@pytest.mark.parametrize(
-    ("sign", "says"), [(signal.SIGTERM, "signal"), (signal.SIGKILL, "signal|ended with status 137")]
+    ("processes", "victim", "sign", "says"),
+    [
+        (1, "liggghts", signal.SIGTERM, "asked to stop by a signal"),
+        (1, "liggghts", signal.SIGKILL, "killed by signal 9"),
+        pytest.param(2, "mpirun", signal.SIGTERM, "signal|ended with status", marks=needs_mpirun),
+        pytest.param(2, "mpirun", signal.SIGKILL, "killed by signal 9", marks=needs_mpirun),
+        pytest.param(2, "liggghts", signal.SIGKILL, "asked to stop by a signal", marks=needs_mpirun),
+        # SIGTERM to one of two ranks is not tried: LIGGGHTS then waits for the other rank for ever (time limit)
+    ],
 )
 def test_a_killed_liggghts_may_be_tried_again(
-    make_spec: Callable[..., PackingSpec], ask: Any, sign: signal.Signals, says: str, processes: int
+    make_spec: Callable[..., PackingSpec], ask: Any, processes: int, victim: str, sign: signal.Signals, says: str
 ) -> None:
-    asked: SettleRequest = ask(make_spec(particles=300, processes=processes))
+    asked: SettleRequest = ask(make_spec(particles=300, processes=processes, time_limit=60.0))
     hit: list[int] = []
 
     def kill() -> None:
         wait_for(lambda: settling(asked.folder))
         for pid in running_in(asked.folder):
-            if Path(f"/proc/{pid}/comm").read_text(encoding="ascii").strip() == "liggghts":
+            if Path(f"/proc/{pid}/comm").read_text(encoding="ascii").strip() == victim:
                 os.kill(pid, sign)
                 hit.append(pid)
                 return
@@ -473,7 +494,8 @@ DUMP_HEAD = "ITEM: TIMESTEP\\n10\\nITEM: NUMBER OF ATOMS\\n100\\nITEM: BOX BOUND
 COLUMNS = "ITEM: ATOMS id type x y z vx vy vz radius\\n"
 CLOUD_AS_DUMP = (
     f"{{ printf '{DUMP_HEAD}{COLUMNS}'; "
-    "sed '1,/^Atoms/d' cloud.data | awk 'NF == 7 {printf \"%s %s %s %s %s 0 0 0 %.17g\\n\", $1, $2, $5, $6, $7, $3 / 2}'; }"
+    "sed '1,/^Atoms/d' cloud.data | "
+    "awk 'NF == 7 {printf \"%s %s %s %s %s 0 0 0 %.17g\\n\", $1, $2, $5, $6, $7, $3 / 2}'; }"
 )
 """Dumps the cloud as it was given."""
 

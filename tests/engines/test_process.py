@@ -63,7 +63,7 @@ def test_a_program_that_may_not_run_is_an_error_in_words(tmp_path: Path) -> None
 
 def test_the_time_limit_ends_the_program_and_its_children(tmp_path: Path) -> None:
     started = time.monotonic()
-    with pytest.raises(EngineError, match="time limit of 0.3 s reached") as caught:
+    with pytest.raises(EngineError, match=r"time limit of 0\.3 s reached") as caught:
         sh("sleep 100 & echo $! > child; echo $$ > own; wait", tmp_path, time_limit=0.3)
     assert caught.value.transient
     assert time.monotonic() - started < process.GRACE_SECONDS + 2.0

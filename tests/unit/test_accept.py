@@ -211,6 +211,16 @@ def test_a_bed_that_never_calmed_down_is_refused(settled_lattice: SimpleNamespac
     assert "not settled" in str(refusal(settled_lattice, trajectory=restless))
 
 
+def test_a_bed_that_the_time_step_keeps_moving_is_told_apart(settled_lattice: SimpleNamespace) -> None:
+    record = settled_lattice.state.trajectory
+    steady = dataclasses.replace(record, kinetic_energy=np.r_[1.0, np.full(29, 0.02)] * 1e-12)
+    text = str(refusal(settled_lattice, trajectory=steady))
+    assert "stays at 2.0e-02 of its peak" in text
+    assert "lower packing.time_step_rayleigh" in text
+    assert "max_fall_times" not in text
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("engine", ["liggghts", "liggghts_as_published"])
 @pytest.mark.parametrize("entries", [0, 1])
 def test_an_engine_without_a_record_is_not_settled(settled_lattice: SimpleNamespace, engine: str, entries: int) -> None:

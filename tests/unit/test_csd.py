@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +103,7 @@ def test_the_means_are_ordered_and_inside_the_sizes(csd: CrystalSizeDistribution
     # d10 <= d32 <= d43 for every distribution (power means), all between the extremes
     tolerance = 1.0 + 1e-12
     means = [csd.smallest, csd.mean_size(1, 0), csd.sauter_mean, csd.mean_size(4, 3), csd.largest]
-    assert all(a <= b * tolerance for a, b in zip(means[:-1], means[1:], strict=True))
+    assert all(a <= b * tolerance for a, b in pairwise(means))
 
 
 # --- classes -------------------------------------------------------------------------------------------------------

@@ -43,7 +43,11 @@ def test_a_complete_output() -> None:
     assert log.version == "LIGGGHTS-PUBLIC 3.8.0"
     assert log.error is None
     assert log.warnings == ("Something is odd (./src/somewhere.cpp:12)",)
-    assert log.states.tolist() == [[0, 143.75, 83.5, 836564.25], [400, 100.5, 12.5, 936564.25], [800, 62.25, 0.5, 1666950]]
+    assert log.states.tolist() == [
+        [0, 143.75, 83.5, 836564.25],
+        [400, 100.5, 12.5, 936564.25],
+        [800, 62.25, 0.5, 1666950],
+    ]
     assert (log.dangerous_builds, log.inserted, log.finished_step, log.forced_end) == (0, None, 800, False)
     assert log.last_line == "@finished 800"
 
@@ -72,7 +76,9 @@ def test_an_output_without_words(text: str) -> None:
 
 
 def test_the_first_error_counts_with_the_line_that_was_being_read() -> None:
-    log = parse_log("units micro\ntimestepp 0.4\nERROR: Unknown command: timestepp (./src/input.cpp:259)\nERROR: more\n")
+    log = parse_log(
+        "units micro\ntimestepp 0.4\nERROR: Unknown command: timestepp (./src/input.cpp:259)\nERROR: more\n"
+    )
     assert log.error == "Unknown command: timestepp (./src/input.cpp:259) (while reading: timestepp 0.4)"
 
 
@@ -84,7 +90,9 @@ def test_errors_of_any_process(prefix: str) -> None:
 
 
 def test_the_echo_of_the_deck_is_not_taken_for_its_output() -> None:
-    log = parse_log('print "@finished ${now}"\nprint "@state ${now} ${height}"\nprint "ERROR: no"\nprint "got SIGTERM"\n')
+    log = parse_log(
+        'print "@finished ${now}"\nprint "@state ${now} ${height}"\nprint "ERROR: no"\nprint "got SIGTERM"\n'
+    )
     assert (log.finished_step, log.error, log.forced_end, len(log.states)) == (None, None, False, 0)
 
 
@@ -131,8 +139,33 @@ def test_any_text_is_parsed(text: str) -> None:
     assert log.states.shape[1] == 4
 
 
-WORDS = ["@state", "@finished", "ERROR", " on proc 0", ": ", "WARNING", "Dangerous builds = ", "1", "2.5", "nan", "-", "\n", " "]
-WORDS += ["LIGGGHTS (Version ", ")", ", compiled", "inserted 5 particle", "insertion", "SIGTERM", "٣", "1e999", "\r", "\x85"]
+WORDS = [
+    "@state",
+    "@finished",
+    "ERROR",
+    " on proc 0",
+    ": ",
+    "WARNING",
+    "Dangerous builds = ",
+    "1",
+    "2.5",
+    "nan",
+    "-",
+    "\n",
+    " ",
+]
+WORDS += [
+    "LIGGGHTS (Version ",
+    ")",
+    ", compiled",
+    "inserted 5 particle",
+    "insertion",
+    "SIGTERM",
+    "٣",
+    "1e999",
+    "\r",
+    "\x85",
+]
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=40).map("".join))
@@ -140,7 +173,9 @@ def test_any_mixture_of_its_own_words_is_parsed(text: str) -> None:
     assert parse_log(text).states.shape[1] == 4
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="src: int() refuses more than 4300 digits, parse_log is not total")
+@pytest.mark.xfail(
+    strict=True, raises=ValueError, reason="src: int() refuses more than 4300 digits, parse_log is not total"
+)
 def test_a_very_long_number_is_parsed() -> None:
     assert parse_log("Dangerous builds = " + "9" * 5000).states.shape[1] == 4
 

@@ -41,7 +41,7 @@ def face_centred(cells: int, layers: int) -> tuple[np.ndarray, np.ndarray, float
     a = math.sqrt(2.0)
     basis = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]) * a
     grid = np.stack(np.meshgrid(*(np.arange(n) for n in (cells, cells, layers)), indexing="ij"), axis=-1)
-    position = (grid.reshape(-1, 1, 3) * a + basis).reshape(-1, 3) + [0.0, 0.0, 0.5]
+    position = (grid.reshape(-1, 1, 3) * a + basis).reshape(-1, 3) + np.array([0.0, 0.0, 0.5])
     return position, np.full(len(position), 0.5), a
 
 

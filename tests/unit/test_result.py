@@ -148,11 +148,11 @@ def test_nan_never_reaches_a_record(packing: Packing, tmp_path: Path) -> None:
 # --- publishing ----------------------------------------------------------------------------------------------------
 
 
-class Boom(Exception):
+class BoomError(Exception):
     """An error in the middle of writing."""
 
 
-@pytest.mark.parametrize("error", [Boom, KeyboardInterrupt, SystemExit])
+@pytest.mark.parametrize("error", [BoomError, KeyboardInterrupt, SystemExit])
 def test_an_error_leaves_the_old_file_and_no_temporary_one(tmp_path: Path, error: type[BaseException]) -> None:
     path = tmp_path / "table.csv"
     path.write_text("old", encoding="utf-8")
@@ -164,9 +164,9 @@ def test_an_error_leaves_the_old_file_and_no_temporary_one(tmp_path: Path, error
 
 
 def test_an_error_where_there_was_no_file_leaves_none(tmp_path: Path) -> None:
-    with pytest.raises(Boom), publish(tmp_path / "table.csv") as temporary:
+    with pytest.raises(BoomError), publish(tmp_path / "table.csv") as temporary:
         temporary.write_text("half", encoding="utf-8")
-        raise Boom
+        raise BoomError
     assert others(tmp_path) == set()
 
 

@@ -89,9 +89,7 @@ def test_units_are_converted_once(points_of) -> None:
 
 def test_the_time_step_follows_the_smallest_sphere_and_the_modulus(points_of) -> None:
     head = SWEEPS.replace("replicates: 3", "replicates: 3, time_step_rayleigh: 0.25")
-    soft, stiff, coarse = points_of(
-        "  - {csd: a}\n  - {csd: a, youngs_modulus_MPa: 20}\n  - {csd: b}\n".replace("", ""), head
-    )
+    soft, stiff, coarse = points_of("  - {csd: a}\n  - {csd: a, youngs_modulus_MPa: 20}\n  - {csd: b}\n", head)
     # 20 um PMMA at 5 MPa: 0.8223 us
     assert soft.spec.time_step == pytest.approx(0.25 * 0.8223e-6, rel=1e-4)
     assert stiff.spec.time_step == pytest.approx(0.5 * soft.spec.time_step, rel=1e-12)
@@ -154,7 +152,8 @@ def test_a_slug_is_readable_and_a_file_name(points_of) -> None:
         r"a_s12\.5_mu0\.05_nu0\.4_e0\.6_E8_[0-9a-f]{8}",
         slug(
             points_of,
-            "{csd: a, cohesion_kJ_m3: 12.5, friction: 0.05, poisson_ratio: 0.4, restitution: 0.6, youngs_modulus_MPa: 8}",
+            "{csd: a, cohesion_kJ_m3: 12.5, friction: 0.05, "
+            "poisson_ratio: 0.4, restitution: 0.6, youngs_modulus_MPa: 8}",
         ),
     )
 
