@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -52,8 +53,6 @@ def test_a_good_bed_is_accepted_and_measured(settled_lattice: SimpleNamespace) -
 
 
 def test_what_was_measured_is_plain_json(settled_lattice: SimpleNamespace) -> None:
-    import json
-
     assert json.loads(json.dumps(judge(settled_lattice), allow_nan=False))["particles"] == 150
 
 

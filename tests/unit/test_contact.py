@@ -44,6 +44,13 @@ def test_rayleigh_time_steps_of_the_paper(diameter_um: float, density: float, mi
     assert step * 1e6 == pytest.approx(microseconds, rel=0.003)  # three figures printed
 
 
+def test_the_rayleigh_step_by_hand() -> None:
+    # pi 10e-6 sqrt(1180 / (5e6/2.4)) / (0.1631*0.2 + 0.8766) s
+    assert contact.rayleigh_time_step(10e-6, 1180.0, E, NU) == pytest.approx(
+        math.pi * 10e-6 * math.sqrt(1180.0 * 2.4 / 5e6) / 0.90922, rel=1e-12
+    )
+
+
 @pytest.mark.parametrize(("step_us", "diameter_um", "density", "percent"), [(0.1, 20, 1180, 12), (0.5, 32.5, 2450, 26)])
 def test_the_paper_s_steps_as_shares_of_rayleigh(
     step_us: float, diameter_um: float, density: float, percent: float

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy
 import pytest
 
 from filtercake import provenance
@@ -115,8 +116,6 @@ def test_versions_name_every_package_even_a_missing_one(monkeypatch: pytest.Monk
     monkeypatch.setattr(provenance, "PACKAGES", ("numpy", "no-such-package-at-all"))
     found = versions()
     assert found["no-such-package-at-all"] == "not installed"
-    import numpy
-
     assert found["numpy"] == numpy.__version__
     assert found["python"].startswith(f"{sys.version_info.major}.{sys.version_info.minor}")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from filtercake.config_loading import LoadedStudy
-from filtercake.csd import mixture
+from filtercake.csd import from_table, mixture, to_table
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed
 from filtercake.packing.result import Packing, write_json
 from filtercake.packing.spec import PackingSpec, digest, stage_seed
@@ -145,8 +146,6 @@ def slug(points_of: Callable[..., list[Point]], sweep: str = "{csd: a}", head: s
 
 
 def test_a_slug_is_readable_and_a_file_name(points_of) -> None:
-    import re
-
     assert re.fullmatch(r"a_s50_mu0_[0-9a-f]{8}", slug(points_of))
     assert re.fullmatch(
         r"a_s12\.5_mu0\.05_nu0\.4_e0\.6_E8_[0-9a-f]{8}",
@@ -247,8 +246,6 @@ def test_clouds_differ_by_replicate_distribution_number_void_fraction_and_base_s
 
 
 def test_a_cloud_s_seed_outlives_a_csv_round_trip(make_spec, pmma, tmp_path: Path) -> None:
-    from filtercake.csd import from_table, to_table
-
     csd = mixture([20.1 * UM, 33.3 * UM, 50 * UM], [1 / 3, 1 / 7, 1 - 1 / 3 - 1 / 7])
     to_table(csd, csd).to_csv(tmp_path / "csd.csv", index=False)
     _, again = from_table(pd.read_csv(tmp_path / "csd.csv"))

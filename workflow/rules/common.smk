@@ -9,7 +9,7 @@ from filtercake.config_loading import find_studies, load_studies, load_workflow
 from filtercake.errors import FiltercakeError
 from filtercake.figures import catalogue
 from filtercake.job import PROGRESS_VARIABLE, Progress
-from filtercake.packing.engines.liggghts import processes as process_count
+from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
 from filtercake.provenance import sources
 from filtercake.study import expand as expand_points

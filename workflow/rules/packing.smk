@@ -16,7 +16,7 @@ rule packing:
         "{results}/{study}/benchmarks/packing/{point}.tsv"
     conda:
         "../envs/filtercake.yaml"
-    threads: lambda wildcards: process_count(point_of(wildcards).spec)
+    threads: lambda wildcards: parallelism(point_of(wildcards).spec)
     resources:
         mem_mb=lambda wildcards: 1000 + point_of(wildcards).spec.particles // 50,
         runtime=packing_minutes,

@@ -16,6 +16,14 @@ from filtercake.packing.spec import PackingSpec
 Progress = Callable[[str], None]
 """Takes one short line about how far a long packing is."""
 
+LARGE_BED = 40_000
+"""Spheres from which one packing takes two processes or threads; smaller ones go side by side instead."""
+
+
+def parallelism(spec: PackingSpec) -> int:
+    """Return how many processes or threads one packing takes: what the spec says, or by its size."""
+    return spec.processes or (2 if spec.particles >= LARGE_BED else 1)
+
 
 @dataclass(frozen=True)
 class SettleRequest:

@@ -11,12 +11,13 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from numba import get_num_threads, set_num_threads
 
 from filtercake import __version__, contact
 from filtercake.errors import EngineError
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import embedded_kernels as kernels
-from filtercake.packing.engines.base import SettleRequest
+from filtercake.packing.engines.base import SettleRequest, parallelism
 from filtercake.packing.result import SettledState
 from filtercake.packing.settling import Trajectory
 from filtercake.packing.spec import PackingSpec
@@ -41,7 +42,10 @@ class Embedded:
     def settle(self, request: SettleRequest) -> SettledState:
         """Let the cloud settle (see :class:`filtercake.packing.engines.base.Engine`)."""
         started = time.monotonic()
-        bed = Bed.from_cloud(request.cloud, request.spec)
+        threads = parallelism(request.spec)
+        if threads > 1:
+            set_num_threads(min(threads, get_num_threads()))
+        bed = Bed.from_cloud(request.cloud, request.spec, threads)
         trajectory = _settle(bed, request, started)
         position, velocity = bed.state()
         return SettledState(
@@ -100,7 +104,7 @@ class Pairs:
             np.zeros(1, dtype=np.int64),
             np.empty(capacity, dtype=np.int32),
             np.empty(capacity, dtype=np.int8),
-            np.empty((capacity, 6)),
+            np.empty((capacity, 6 if frictional else 4)),
             np.zeros((capacity if frictional else 1, 3)),
         )
 
@@ -120,6 +124,7 @@ class Bed:
         length: float,
         spec: PackingSpec,
         gravity: float = GRAVITY,
+        threads: int = 1,
     ):
         """Start from positions (n, 3) m, velocities (n, 3) m/s and radii (n,) m; every sphere is in the bed."""
         self.gravity = gravity
@@ -129,7 +134,11 @@ class Bed:
         self.position, self.velocity = position.copy(), velocity.copy()
         self.radius = radius.copy()
         self.mass = spec.density * 4.0 / 3.0 * np.pi * radius**3
-        self.spin, self.force, self.torque = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        self.spin = np.zeros((n, 3))
+        self.threads = threads
+        self.force = np.zeros((threads, n, 3))
+        self.torque = np.zeros((threads, n if self.frictional else 1, 3))
+        self.bounds = np.zeros(threads + 1, dtype=np.int64)
         self.floor_spring = np.zeros((n, 2))
         self.reference = np.zeros((n, 3))
         self.identity = np.arange(n)
@@ -139,21 +148,24 @@ class Bed:
         )
         self.skin = spec.skin or SKIN_DIAMETERS * 2.0 * float(radius.min())
         self.cell_size = np.maximum(2.0 * self.largest, 2.0 * float(radius.min())) + self.skin
+        self.ceiling = 5.0 * max(length, float(position[:, 2].max(initial=0.0)))
         self.count = n
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
+        self.horizon = 0  # step at which airborne spheres are looked at again
+        self.evaluated = -1  # step whose positions the forces and springs belong to
         self.pairs = Pairs.empty(8 * n + 64, self.frictional)
-        self.kernel = kernels.make_advance(spec.cohesion > 0.0, self.frictional)
+        self.kernel = kernels.make_advance(spec.cohesion > 0.0, self.frictional, threads > 1)
         self._set_material()
 
     @classmethod
-    def from_cloud(cls, cloud: Cloud, spec: PackingSpec) -> Bed:
+    def from_cloud(cls, cloud: Cloud, spec: PackingSpec, threads: int = 1) -> Bed:
         """Start from a cloud of spheres falling together: all airborne."""
         bottom = cloud.position[:, 2] - cloud.radius
         order = np.argsort(bottom, kind="stable")
         velocity = np.zeros_like(cloud.position)
         velocity[:, 2] = -spec.settling_velocity
-        bed = cls(cloud.position[order], velocity, cloud.radius[order], cloud.length, spec)
+        bed = cls(cloud.position[order], velocity, cloud.radius[order], cloud.length, spec, threads=threads)
         bed.identity = order
         bed.count = 0
         bed.starting = False
@@ -191,11 +203,10 @@ class Bed:
                     self.step = min(end, self._first_wake(end))
                     continue
                 self._list_pairs()
-                horizon = self.step + HORIZON_STEPS
-            if self.count < self.total and self.step >= horizon:
+            if self.count < self.total and self.step >= self.horizon:
                 self.listed = False
                 continue
-            until = min(end, horizon) if self.count < self.total else end
+            until = min(end, self.horizon) if self.count < self.total else end
             done = self._run(until - self.step)
             self.step += done
 
@@ -205,15 +216,17 @@ class Bed:
             steps,
             self.ready,
             self.starting,
+            not self.ready and (self.starting or self.evaluated == self.step),
             self.position[:n],
             self.velocity[:n],
             self.spin[:n],
-            self.force[:n],
-            self.torque[:n],
+            self.force,
+            self.torque,
             self.radius[:n],
             self.mass[:n],
             self.floor[:n],
             self.floor_spring[:n],
+            self.bounds,
             pairs.first,
             pairs.neighbour,
             pairs.image,
@@ -228,6 +241,7 @@ class Bed:
             0.5 * self.skin,
         )
         self.starting = self.starting and done == 0
+        self.evaluated = self.step + done if self.ready else -1
         self.listed = self.ready
         return int(done)
 
@@ -266,13 +280,13 @@ class Bed:
         n = self.count
         self.position[:n, :2] %= self.length
         top = float(self.position[:n, 2].max())
-        if not math.isfinite(top):
-            raise EngineError("the bed exploded: positions are no longer finite; use a shorter time step")
+        if not top < self.ceiling:
+            raise EngineError("the bed exploded: spheres fly far above where they started; use a shorter time step")
         order, start, shape, offset = kernels.sort_into_cells(
             self.position[:n], self.level[:n], self.cell_size, self.length, max(top, 0.0)
         )
         for array in self._arrays():
-            array[:n] = array[:n][order]
+            array[:n] = array[:n][order]  # forces are not carried along: pairs are listed when they are unknown
         old = self.pairs
         new = Pairs.empty(old.neighbour.size, self.frictional) if self.frictional else old
         first = np.empty(n + 1, dtype=np.int64)
@@ -297,8 +311,12 @@ class Bed:
             origin = np.where(order < known, order, -1)
             kernels.carry_springs(origin, old.first, old.neighbour, old.spring, first, new.neighbour, new.spring)
         self.pairs = new
+        self.bounds[:] = np.searchsorted(first, np.linspace(0, first[-1], self.threads + 1))
+        self.bounds[0], self.bounds[-1] = 0, n
+        self.ready = False
         self.reference[:n] = self.position[:n]
         self.listed = True
+        self.horizon = self.step + HORIZON_STEPS
 
     def _find_pairs(self, grid: kernels.Grid, first: IntArray, pairs: Pairs) -> int:
         n = self.count
@@ -321,8 +339,6 @@ class Bed:
             self.position,
             self.velocity,
             self.spin,
-            self.force,
-            self.torque,
             self.radius,
             self.mass,
             self.floor,
@@ -336,7 +352,7 @@ class Bed:
         n = self.count
         position, velocity = self.position.copy(), self.velocity.copy()
         half = 0.0 if self.starting else 0.5 * self.spec.time_step
-        velocity[:n] += half * self.force[:n] / self.mass[:n, None]
+        velocity[:n] += half * self.force[0, :n] / self.mass[:n, None]
         position[n:, 2] -= self.fallen(self.step)
         velocity[n:, 2] -= self.gravity * self.step * self.spec.time_step
         return position, velocity
@@ -353,7 +369,7 @@ class Bed:
         spin = self.spin.copy()
         if self.frictional and not self.starting:
             inertia = 0.4 * self.mass * self.radius**2
-            spin[: self.count] += (0.5 * self.spec.time_step * self.torque / inertia[:, None])[: self.count]
+            spin[: self.count] += (0.5 * self.spec.time_step * self.torque[0] / inertia[:, None])[: self.count]
         return spin[np.argsort(self.identity)]
 
     def record(self) -> tuple[float, float, float, float]:

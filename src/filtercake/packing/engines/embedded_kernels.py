@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from filtercake.units import FloatArray, IntArray
 
@@ -26,6 +26,9 @@ class Grid(NamedTuple):
     largest: FloatArray
     cell_size: FloatArray
 
+
+SAME_IMAGE = 4
+"""Code of a neighbour in the box itself, not in one of its eight periodic images."""
 
 # columns of a pair's constants
 RADIUS_SUM, RADIUS_DIFFERENCE_SQUARED, STIFFNESS, DAMPING, SHEAR_STIFFNESS, SHEAR_DAMPING = range(6)
@@ -111,26 +114,28 @@ def find_pairs(
             reach = r + largest[k] + skin
             across, layers = shape[k, 0], shape[k, 2]
             inverse = across / length
-            x0, x1 = math.floor((x - reach) * inverse), math.floor((x + reach) * inverse)
-            y0, y1 = math.floor((y - reach) * inverse), math.floor((y + reach) * inverse)
-            z0 = max(0, math.floor((z - reach) / cell_size[k]))
-            z1 = min(layers - 1, max(0, math.floor((z + reach) / cell_size[k])))
-            for cz in range(min(z0, layers - 1), z1 + 1):
+            # one periodic image to either side: the next is a sphere's own width away and never touches
+            x0 = max(math.floor((x - reach) * inverse), -across)
+            x1 = min(math.floor((x + reach) * inverse), 2 * across - 1)
+            y0 = max(math.floor((y - reach) * inverse), -across)
+            y1 = min(math.floor((y + reach) * inverse), 2 * across - 1)
+            z0 = min(max(math.floor((z - reach) / cell_size[k]), 0), layers - 1)
+            z1 = min(max(math.floor((z + reach) / cell_size[k]), 0), layers - 1)
+            for cz in range(z0, z1 + 1):
                 for cy in range(y0, y1 + 1):
-                    wrap_y = math.floor(cy / across)
-                    if wrap_y < -1 or wrap_y > 1:  # a sphere's own width away: never a contact
-                        continue
-                    row = offset[k] + (cz * across + (cy - wrap_y * across)) * across
+                    wrap_y = -1 if cy < 0 else (1 if cy >= across else 0)
+                    ys = y - wrap_y * length
+                    row = offset[k] + (cz * across + cy - wrap_y * across) * across
                     for cx in range(x0, x1 + 1):
-                        wrap_x = math.floor(cx / across)
-                        if wrap_x < -1 or wrap_x > 1:
-                            continue
+                        wrap_x = -1 if cx < 0 else (1 if cx >= across else 0)
+                        xs = x - wrap_x * length
                         c = row + cx - wrap_x * across
-                        for j in range(start[c], start[c + 1]):
-                            if k == own and j <= i:
-                                continue
-                            dx = x - position[j, 0] - wrap_x * length
-                            dy = y - position[j, 1] - wrap_y * length
+                        begin = start[c]
+                        if k == own:
+                            begin = max(begin, i + 1)  # each pair once
+                        for j in range(begin, start[c + 1]):
+                            dx = xs - position[j, 0]
+                            dy = ys - position[j, 1]
                             dz = z - position[j, 2]
                             near = r + radius[j] + skin
                             if dx * dx + dy * dy + dz * dz < near * near:
@@ -164,8 +169,9 @@ def pair_constants(
             constants[p, RADIUS_DIFFERENCE_SQUARED] = (radius[i] - radius[j]) ** 2
             constants[p, STIFFNESS] = 4.0 / 3.0 * modulus * root
             constants[p, DAMPING] = damping * math.sqrt(2.0 * modulus * root * reduced)
-            constants[p, SHEAR_STIFFNESS] = 8.0 * shear_modulus * root
-            constants[p, SHEAR_DAMPING] = damping * math.sqrt(8.0 * shear_modulus * root * reduced)
+            if constants.shape[1] > SHEAR_STIFFNESS:
+                constants[p, SHEAR_STIFFNESS] = 8.0 * shear_modulus * root
+                constants[p, SHEAR_DAMPING] = damping * math.sqrt(8.0 * shear_modulus * root * reduced)
 
 
 @njit(cache=True)
@@ -197,14 +203,18 @@ def carry_springs(
 
 
 @cache
-def make_advance(cohesive: bool, frictional: bool) -> Callable[..., tuple[int, bool]]:
-    """Compile the time loop for one kind of scene: what it doesn't need is not in its code."""
+def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
+    """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
-    @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+    A threaded loop gives each thread a share of the pairs and a force buffer of its own.
+    """
+
+    @njit(cache=True, error_model="numpy", parallel=threaded)
     def advance(
         steps: int,
         ready: bool,
         starting: bool,
+        hold_springs: bool,
         position: FloatArray,
         velocity: FloatArray,
         spin: FloatArray,
@@ -214,6 +224,7 @@ def make_advance(cohesive: bool, frictional: bool) -> Callable[..., tuple[int, b
         mass: FloatArray,
         floor: FloatArray,
         floor_spring: FloatArray,
+        bounds: IntArray,
         first: IntArray,
         neighbour: np.ndarray[Any, np.dtype[np.int32]],
         image: np.ndarray[Any, np.dtype[np.int8]],
@@ -230,177 +241,183 @@ def make_advance(cohesive: bool, frictional: bool) -> Callable[..., tuple[int, b
         """Advance up to ``steps``; return the steps done and whether the forces at the new positions are known.
 
         It stops early, forces unknown, when a sphere has moved by ``drift_limit`` since the pairs were listed.
+        ``hold_springs`` says that the springs already know these positions (at the start, or when the forces
+        are asked for a second time). ``force`` and ``torque`` have one layer per thread, shape (threads, n, 3);
+        the first ends as the total. ``bounds`` (threads + 1,) are the spheres whose pairs each thread works on.
         """
         n = radius.size
+        parts = bounds.size - 1
         done = 0
         limit = drift_limit * drift_limit
-        quarter_pi = 0.25 * math.pi * cohesion
+        area_factor = 0.25 * math.pi * cohesion
+        drift = np.zeros(parts)
         while True:
             if not ready:
-                spring_step = 0.0 if starting else time_step
-                for i in range(n):
-                    force[i, 0] = 0.0
-                    force[i, 1] = 0.0
-                    force[i, 2] = -mass[i] * gravity
-                    if frictional:
-                        torque[i, 0] = torque[i, 1] = torque[i, 2] = 0.0
-                for i in range(n):
-                    xi, yi, zi = position[i, 0], position[i, 1], position[i, 2]
-                    ui, vi, wi = velocity[i, 0], velocity[i, 1], velocity[i, 2]
-                    fx = fy = fz = 0.0
-                    tx = ty = tz = 0.0
-                    for p in range(first[i], first[i + 1]):
-                        j = neighbour[p]
-                        code = image[p]
-                        dx = xi - position[j, 0]
-                        dy = yi - position[j, 1]
-                        dz = zi - position[j, 2]
-                        if code != 4:
-                            dx -= (code % 3 - 1) * length
-                            dy -= (code // 3 - 1) * length
-                        square = dx * dx + dy * dy + dz * dz
-                        total = constants[p, RADIUS_SUM]
-                        if square >= total * total:
+                spring_step = 0.0 if hold_springs else time_step
+                hold_springs = False
+                for t in prange(parts):
+                    for i in range(n):
+                        force[t, i, 0] = force[t, i, 1] = force[t, i, 2] = 0.0
+                        if frictional:
+                            torque[t, i, 0] = torque[t, i, 1] = torque[t, i, 2] = 0.0
+                    for i in range(bounds[t], bounds[t + 1]):
+                        xi, yi, zi = position[i, 0], position[i, 1], position[i, 2]
+                        ui, vi, wi = velocity[i, 0], velocity[i, 1], velocity[i, 2]
+                        fx, fy, fz = 0.0, 0.0, 0.0
+                        tx, ty, tz = 0.0, 0.0, 0.0
+                        for p in range(first[i], first[i + 1]):
+                            j = neighbour[p]
+                            code = image[p]
+                            dx = xi - position[j, 0]
+                            dy = yi - position[j, 1]
+                            dz = zi - position[j, 2]
+                            if code != SAME_IMAGE:
+                                dx -= (code % 3 - 1) * length
+                                dy -= (code // 3 - 1) * length
+                            square = dx * dx + dy * dy + dz * dz
+                            total = constants[p, RADIUS_SUM]
+                            if square >= total * total:
+                                if frictional:
+                                    spring[p, 0] = spring[p, 1] = spring[p, 2] = 0.0
+                                continue
+                            r = math.sqrt(square)
+                            inverse = 1.0 / r
+                            nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
+                            overlap = total - r
+                            root = math.sqrt(overlap)
+                            quarter = math.sqrt(root)
+                            du, dv, dw = ui - velocity[j, 0], vi - velocity[j, 1], wi - velocity[j, 2]
+                            normal_speed = du * nx + dv * ny + dw * nz
+                            elastic = constants[p, STIFFNESS] * overlap * root
+                            normal = elastic - constants[p, DAMPING] * quarter * normal_speed
+                            push = normal
+                            if cohesive:
+                                lens = overlap * (total + r) * (square - constants[p, RADIUS_DIFFERENCE_SQUARED])
+                                push -= area_factor * lens * (inverse * inverse)
+                            gx, gy, gz = push * nx, push * ny, push * nz
                             if frictional:
-                                spring[p, 0] = spring[p, 1] = spring[p, 2] = 0.0
+                                arm_i = radius[i] - 0.5 * overlap
+                                arm_j = radius[j] - 0.5 * overlap
+                                ox = arm_i * spin[i, 0] + arm_j * spin[j, 0]
+                                oy = arm_i * spin[i, 1] + arm_j * spin[j, 1]
+                                oz = arm_i * spin[i, 2] + arm_j * spin[j, 2]
+                                sx = du - normal_speed * nx - (nz * oy - ny * oz)
+                                sy = dv - normal_speed * ny - (nx * oz - nz * ox)
+                                sz = dw - normal_speed * nz - (ny * ox - nx * oy)
+                                hx = spring[p, 0] + sx * spring_step
+                                hy = spring[p, 1] + sy * spring_step
+                                hz = spring[p, 2] + sz * spring_step
+                                along = hx * nx + hy * ny + hz * nz
+                                hx -= along * nx
+                                hy -= along * ny
+                                hz -= along * nz
+                                stiffness = constants[p, SHEAR_STIFFNESS] * root
+                                stretched = stiffness * math.sqrt(hx * hx + hy * hy + hz * hz)
+                                allowed = friction * abs(normal)
+                                if stretched > allowed:
+                                    ratio = allowed / stretched
+                                    hx *= ratio
+                                    hy *= ratio
+                                    hz *= ratio
+                                    px, py, pz = -stiffness * hx, -stiffness * hy, -stiffness * hz
+                                else:
+                                    drag = constants[p, SHEAR_DAMPING] * quarter
+                                    px = -stiffness * hx - drag * sx
+                                    py = -stiffness * hy - drag * sy
+                                    pz = -stiffness * hz - drag * sz
+                                spring[p, 0], spring[p, 1], spring[p, 2] = hx, hy, hz
+                                gx += px
+                                gy += py
+                                gz += pz
+                                mx, my, mz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
+                                tx -= arm_i * mx
+                                ty -= arm_i * my
+                                tz -= arm_i * mz
+                                torque[t, j, 0] -= arm_j * mx
+                                torque[t, j, 1] -= arm_j * my
+                                torque[t, j, 2] -= arm_j * mz
+                            fx += gx
+                            fy += gy
+                            fz += gz
+                            force[t, j, 0] -= gx
+                            force[t, j, 1] -= gy
+                            force[t, j, 2] -= gz
+                        force[t, i, 0] += fx
+                        force[t, i, 1] += fy
+                        force[t, i, 2] += fz
+                        if frictional:
+                            torque[t, i, 0] += tx
+                            torque[t, i, 1] += ty
+                            torque[t, i, 2] += tz
+                for t in prange(parts):
+                    for i in range(t * n // parts, (t + 1) * n // parts):
+                        for other in range(1, parts):
+                            for k in range(3):
+                                force[0, i, k] += force[other, i, k]
+                                if frictional:
+                                    torque[0, i, k] += torque[other, i, k]
+                        force[0, i, 2] -= mass[i] * gravity
+                        overlap = radius[i] - position[i, 2]
+                        if overlap <= 0.0:
+                            if frictional:
+                                floor_spring[i, 0] = floor_spring[i, 1] = 0.0
                             continue
-                        r = math.sqrt(square)
-                        inverse = 1.0 / r
-                        nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
-                        overlap = total - r
                         root = math.sqrt(overlap)
                         quarter = math.sqrt(root)
-                        du, dv, dw = ui - velocity[j, 0], vi - velocity[j, 1], wi - velocity[j, 2]
-                        normal_speed = du * nx + dv * ny + dw * nz
-                        normal = (
-                            constants[p, STIFFNESS] * overlap * root - constants[p, DAMPING] * quarter * normal_speed
-                        )
-                        push = normal
+                        normal = floor[i, 0] * overlap * root - floor[i, 1] * quarter * velocity[i, 2]
+                        force[0, i, 2] += normal
                         if cohesive:
-                            push -= (
-                                quarter_pi
-                                * overlap
-                                * (total + r)
-                                * (square - constants[p, RADIUS_DIFFERENCE_SQUARED])
-                                * (inverse * inverse)
-                            )
-                        gx, gy, gz = push * nx, push * ny, push * nz
+                            force[0, i, 2] -= 4.0 * area_factor * overlap * (radius[i] + position[i, 2])
                         if frictional:
-                            arm_i = radius[i] - 0.5 * overlap
-                            arm_j = radius[j] - 0.5 * overlap
-                            ox = arm_i * spin[i, 0] + arm_j * spin[j, 0]
-                            oy = arm_i * spin[i, 1] + arm_j * spin[j, 1]
-                            oz = arm_i * spin[i, 2] + arm_j * spin[j, 2]
-                            sx = du - normal_speed * nx - (nz * oy - ny * oz)
-                            sy = dv - normal_speed * ny - (nx * oz - nz * ox)
-                            sz = dw - normal_speed * nz - (ny * ox - nx * oy)
-                            hx = spring[p, 0] + sx * spring_step
-                            hy = spring[p, 1] + sy * spring_step
-                            hz = spring[p, 2] + sz * spring_step
-                            along = hx * nx + hy * ny + hz * nz
-                            hx -= along * nx
-                            hy -= along * ny
-                            hz -= along * nz
-                            stiffness = constants[p, SHEAR_STIFFNESS] * root
-                            stretched = stiffness * math.sqrt(hx * hx + hy * hy + hz * hz)
+                            arm = position[i, 2] + 0.5 * overlap
+                            sx = velocity[i, 0] - arm * spin[i, 1]
+                            sy = velocity[i, 1] + arm * spin[i, 0]
+                            hx = floor_spring[i, 0] + sx * spring_step
+                            hy = floor_spring[i, 1] + sy * spring_step
+                            stiffness = floor[i, 2] * root
+                            stretched = stiffness * math.sqrt(hx * hx + hy * hy)
                             allowed = friction * abs(normal)
                             if stretched > allowed:
                                 ratio = allowed / stretched
                                 hx *= ratio
                                 hy *= ratio
-                                hz *= ratio
-                                px, py, pz = -stiffness * hx, -stiffness * hy, -stiffness * hz
+                                px, py = -stiffness * hx, -stiffness * hy
                             else:
-                                drag = constants[p, SHEAR_DAMPING] * quarter
+                                drag = floor[i, 3] * quarter
                                 px = -stiffness * hx - drag * sx
                                 py = -stiffness * hy - drag * sy
-                                pz = -stiffness * hz - drag * sz
-                            spring[p, 0], spring[p, 1], spring[p, 2] = hx, hy, hz
-                            gx += px
-                            gy += py
-                            gz += pz
-                            mx, my, mz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-                            tx -= arm_i * mx
-                            ty -= arm_i * my
-                            tz -= arm_i * mz
-                            torque[j, 0] -= arm_j * mx
-                            torque[j, 1] -= arm_j * my
-                            torque[j, 2] -= arm_j * mz
-                        fx += gx
-                        fy += gy
-                        fz += gz
-                        force[j, 0] -= gx
-                        force[j, 1] -= gy
-                        force[j, 2] -= gz
-                    force[i, 0] += fx
-                    force[i, 1] += fy
-                    force[i, 2] += fz
-                    if frictional:
-                        torque[i, 0] += tx
-                        torque[i, 1] += ty
-                        torque[i, 2] += tz
-                for i in range(n):
-                    overlap = radius[i] - position[i, 2]
-                    if overlap <= 0.0:
-                        if frictional:
-                            floor_spring[i, 0] = floor_spring[i, 1] = 0.0
-                        continue
-                    root = math.sqrt(overlap)
-                    quarter = math.sqrt(root)
-                    normal = floor[i, 0] * overlap * root - floor[i, 1] * quarter * velocity[i, 2]
-                    force[i, 2] += normal
-                    if cohesive:
-                        force[i, 2] -= 4.0 * quarter_pi * overlap * (radius[i] + position[i, 2])
-                    if frictional:
-                        arm = position[i, 2] + 0.5 * overlap
-                        sx = velocity[i, 0] - arm * spin[i, 1]
-                        sy = velocity[i, 1] + arm * spin[i, 0]
-                        hx = floor_spring[i, 0] + sx * spring_step
-                        hy = floor_spring[i, 1] + sy * spring_step
-                        stiffness = floor[i, 2] * root
-                        stretched = stiffness * math.sqrt(hx * hx + hy * hy)
-                        allowed = friction * abs(normal)
-                        if stretched > allowed:
-                            ratio = allowed / stretched
-                            hx *= ratio
-                            hy *= ratio
-                            px, py = -stiffness * hx, -stiffness * hy
-                        else:
-                            drag = floor[i, 3] * quarter
-                            px = -stiffness * hx - drag * sx
-                            py = -stiffness * hy - drag * sy
-                        floor_spring[i, 0], floor_spring[i, 1] = hx, hy
-                        force[i, 0] += px
-                        force[i, 1] += py
-                        torque[i, 0] += arm * py
-                        torque[i, 1] -= arm * px
+                            floor_spring[i, 0], floor_spring[i, 1] = hx, hy
+                            force[0, i, 0] += px
+                            force[0, i, 1] += py
+                            torque[0, i, 0] += arm * py
+                            torque[0, i, 1] -= arm * px
                 ready = True
             if done == steps:
                 return done, ready
             kick = 0.5 * time_step if starting else time_step
             starting = False
-            moved = 0.0
-            for i in range(n):
-                scale = kick / mass[i]
-                velocity[i, 0] += scale * force[i, 0]
-                velocity[i, 1] += scale * force[i, 1]
-                velocity[i, 2] += scale * force[i, 2]
-                if frictional:
-                    turn = scale / (0.4 * radius[i] * radius[i])
-                    spin[i, 0] += turn * torque[i, 0]
-                    spin[i, 1] += turn * torque[i, 1]
-                    spin[i, 2] += turn * torque[i, 2]
-                position[i, 0] += time_step * velocity[i, 0]
-                position[i, 1] += time_step * velocity[i, 1]
-                position[i, 2] += time_step * velocity[i, 2]
-                ax = position[i, 0] - reference[i, 0]
-                ay = position[i, 1] - reference[i, 1]
-                az = position[i, 2] - reference[i, 2]
-                moved = max(moved, ax * ax + ay * ay + az * az)
+            for t in prange(parts):
+                farthest = 0.0
+                for i in range(t * n // parts, (t + 1) * n // parts):
+                    scale = kick / mass[i]
+                    away = 0.0
+                    for k in range(3):
+                        velocity[i, k] += scale * force[0, i, k]
+                        position[i, k] += time_step * velocity[i, k]
+                        moved = position[i, k] - reference[i, k]
+                        away += moved * moved
+                    if frictional:
+                        turn = scale / (0.4 * radius[i] * radius[i])
+                        for k in range(3):
+                            spin[i, k] += turn * torque[0, i, k]
+                    if not away <= farthest:  # keeps what is not a number, too
+                        farthest = away
+                drift[t] = farthest
             done += 1
             ready = False
-            if not moved < limit:  # also when it is not a number
-                return done, ready
+            for t in range(parts):
+                if not drift[t] < limit:
+                    return done, ready
 
     compiled: Callable[..., tuple[int, bool]] = advance
     return compiled

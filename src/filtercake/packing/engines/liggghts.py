@@ -15,7 +15,7 @@ import numpy as np
 from filtercake.errors import EngineError, EngineMissing
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import micro, process
-from filtercake.packing.engines.base import SettleRequest
+from filtercake.packing.engines.base import SettleRequest, parallelism
 from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
 from filtercake.packing.result import SettledState
 from filtercake.packing.spec import PackingSpec
@@ -24,8 +24,6 @@ from filtercake.units import GRAVITY, FloatArray
 EXECUTABLE_VARIABLE = "FILTERCAKE_LIGGGHTS"
 EXECUTABLES = ("liggghts", "lmp_auto", "lmp_liggghts")
 TEMPLATE_FOLDER_VARIABLE = "FILTERCAKE_TEMPLATES"
-PARTICLES_PER_PROCESS = 20_000
-"""Beds smaller than this run on one process; below it MPI costs more than it gives."""
 PROGRESS_SECONDS = 20.0
 
 _COLUMNS = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
@@ -95,7 +93,7 @@ class Liggghts:
         (folder / "packing.in").write_text(render(self.template, values), encoding="utf-8")
         screen = folder / "screen.log"
         started = time.monotonic()
-        status = process.run(command(processes(spec)), folder, screen, spec.time_limit, _Watcher(screen, request))
+        status = process.run(command(parallelism(spec)), folder, screen, spec.time_limit, _Watcher(screen, request))
         wall_time = time.monotonic() - started
         log = parse_log(screen.read_text(encoding="utf-8", errors="replace"))
         check_end(status, log)
@@ -174,13 +172,6 @@ def contact_model(tangential: bool, cohesive: bool) -> str:
 def default_skin(cloud: Cloud) -> float:
     """Neighbour skin, m: 15 % of the smallest diameter keeps the pair list near the real contacts."""
     return 0.3 * float(cloud.radius.min())
-
-
-def processes(spec: PackingSpec) -> int:
-    """MPI processes of a packing: one below ``PARTICLES_PER_PROCESS`` spheres, else two, unless the spec says."""
-    if spec.processes > 0:
-        return spec.processes
-    return 2 if spec.particles >= 2 * PARTICLES_PER_PROCESS else 1
 
 
 def command(process_count: int) -> list[str]:
