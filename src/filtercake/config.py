@@ -58,16 +58,18 @@ def _name(value: Any) -> Any:
     return value
 
 
-Number = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
-Whole = Annotated[int, BeforeValidator(_whole)]
+# the bounds stand before the conversion, or they are lost from the JSON schema
+TO_NUMBER = BeforeValidator(_number)
+TO_WHOLE = BeforeValidator(_whole)
+Number = Annotated[float, Field(allow_inf_nan=False), TO_NUMBER]
 Name = Annotated[str, BeforeValidator(_name)]
 
-Density = Annotated[Number, Field(gt=0, le=25_000)]
-YoungsModulus = Annotated[Number, Field(ge=0.5, le=100_000)]
-PoissonRatio = Annotated[Number, Field(ge=0, lt=0.5)]
-Restitution = Annotated[Number, Field(gt=0, lt=1)]
-Friction = Annotated[Number, Field(ge=0, le=2)]
-Cohesion = Annotated[Number, Field(ge=0)]
+Density = Annotated[float, Field(gt=0, le=25_000, allow_inf_nan=False), TO_NUMBER]
+YoungsModulus = Annotated[float, Field(ge=0.5, le=100_000, allow_inf_nan=False), TO_NUMBER]
+PoissonRatio = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER]
+Restitution = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER]
+Friction = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False), TO_NUMBER]
+Cohesion = Annotated[float, Field(ge=0, allow_inf_nan=False), TO_NUMBER]
 
 EngineName = Literal["auto", "liggghts", "embedded", "liggghts_as_published"]
 
@@ -81,8 +83,14 @@ class Model(BaseModel):
 class SizeClass(Model):
     """One size of a mixture."""
 
-    size_um: Annotated[Number, Field(gt=0, le=100_000, description="Crystal diameter, um.")]
-    volume_fraction: Annotated[Number, Field(gt=0, le=1, description="Its share of the crystal volume (= mass).")]
+    size_um: Annotated[
+        float, Field(gt=0, le=100_000, description="Crystal diameter, um.", allow_inf_nan=False), TO_NUMBER
+    ]
+    volume_fraction: Annotated[
+        float,
+        Field(gt=0, le=1, description="Its share of the crystal volume (= mass).", allow_inf_nan=False),
+        TO_NUMBER,
+    ]
 
 
 class Csd(Model):
@@ -98,7 +106,7 @@ class Csd(Model):
         default=None,
         description="CSV with the columns size_um,volume_fraction; path relative to the study file.",
     )
-    truncate_below_volume_fraction: Annotated[Number, Field(ge=0, lt=0.5)] = Field(
+    truncate_below_volume_fraction: Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.0,
         description="Classes below this volume share are left out of the packing (not of the resistance).",
     )
@@ -119,7 +127,7 @@ class Material(Model):
     restitution: Restitution = Field(default=0.3, description="Coefficient of restitution.")
     friction: Friction = Field(default=0.0, description="Coefficient of friction.")
     cohesion_kJ_m3: Cohesion = Field(default=50.0, description="Cohesion energy density, kJ/m3.")  # noqa: N815
-    sphericity: Annotated[Number, Field(gt=0, le=1)] = Field(
+    sphericity: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1.0, description="Sphericity in the resistance law; packings are of spheres."
     )
 
@@ -127,41 +135,43 @@ class Material(Model):
 class Packing(Model):
     """How the packings are made."""
 
-    particles: Annotated[Whole, Field(ge=50, le=2_000_000)] = Field(default=2000, description="Spheres in one packing.")
-    void_fraction: Annotated[Number, Field(ge=0.5, le=0.95)] = Field(
+    particles: Annotated[int, Field(ge=50, le=2_000_000), TO_WHOLE] = Field(
+        default=2000, description="Spheres in one packing."
+    )
+    void_fraction: Annotated[float, Field(ge=0.5, le=0.95, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.65, description="Void fraction of the initial cloud; 0.65, or 0.60 for broad distributions."
     )
-    settling_velocity_m_s: Annotated[Number, Field(ge=0, le=1)] = Field(
+    settling_velocity_m_s: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.01, description="Initial downward speed of the spheres, m/s."
     )
-    time_step_rayleigh: Annotated[Number, Field(gt=0, lt=1)] | None = Field(
+    time_step_rayleigh: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None,
         description=(
             "Time step over the Rayleigh time step of the smallest sphere; "
             f"{FRICTIONLESS_TIME_STEP:g} without friction and {FRICTIONAL_TIME_STEP:g} with it if left out."
         ),
     )
-    time_step_us: Annotated[Number, Field(gt=0)] | None = Field(
+    time_step_us: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None, description="Time step, us; overrides time_step_rayleigh."
     )
-    replicates: Annotated[Whole, Field(ge=1, le=1000)] = Field(
+    replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] = Field(
         default=3, description="Packings per point, from different initial clouds."
     )
     engine: EngineName = Field(default="auto", description="auto takes the best engine on this machine; or name one.")
-    seed: Annotated[Whole, Field(ge=0)] = Field(default=1, description="Base seed of all random numbers.")
-    porosity_tolerance: Annotated[Number, Field(gt=0, le=0.01)] = Field(
+    seed: Annotated[int, Field(ge=0), TO_WHOLE] = Field(default=1, description="Base seed of all random numbers.")
+    porosity_tolerance: Annotated[float, Field(gt=0, le=0.01, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1e-4, description="The bed is at rest when its porosity falls by less than this per check."
     )
-    max_fall_times: Annotated[Number, Field(ge=1, le=100)] = Field(
+    max_fall_times: Annotated[float, Field(ge=1, le=100, allow_inf_nan=False), TO_NUMBER] = Field(
         default=4.0, description="Unsettled after this many free-fall times of the highest sphere."
     )
-    skin_um: Annotated[Number, Field(gt=0)] | None = Field(
+    skin_um: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None, description="Neighbour skin, um; the engine chooses if left out."
     )
-    processes: Annotated[Whole, Field(ge=0, le=256)] = Field(
+    processes: Annotated[int, Field(ge=0, le=256), TO_WHOLE] = Field(
         default=0, description="MPI processes of one packing; 0 chooses by size."
     )
-    time_limit_min: Annotated[Number, Field(gt=0)] = Field(
+    time_limit_min: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] = Field(
         default=240.0, description="Wall-clock limit of one packing, min."
     )
     write_vtk: bool = Field(default=False, description="Keep pictures of the settling for ParaView.")
@@ -195,7 +205,7 @@ class Sweep(Model):
     youngs_modulus_MPa: (  # noqa: N815
         Annotated[list[YoungsModulus], BeforeValidator(_listed), Field(min_length=1)] | None
     ) = Field(default=None, description="Young's moduli, MPa.")
-    replicates: Annotated[Whole, Field(ge=1, le=1000)] | None = Field(
+    replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] | None = Field(
         default=None, description="Packings per point of this block, instead of packing.replicates."
     )
 

@@ -123,9 +123,14 @@ def _value(published: Published | None) -> float:
 def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
     """Set every published porosity simulated at a visited point beside ours by the same estimator.
 
-    ``deviation_sd`` is the published value's distance from our mean in standard deviations of one packing: a
-    published value is one packing (or a few), so that within three of them it is no different.
+    ``sd`` is the standard deviation of one packing, pooled over the study's points of the same engine: a few
+    replicates of one point say little about it. ``deviation_sd`` is the published value's distance from our mean
+    in these: a published value is one packing (or a few), so that within three of them it is no different.
     """
+    good = replicates[replicates["status"] == "ok"]
+    spread = good.groupby(["engine", "point"])["porosity_as_published"].agg(["var", "count"]).dropna()
+    weight = spread["count"] - 1
+    pooled = np.sqrt((spread["var"] * weight).groupby("engine").sum() / weight.groupby("engine").sum())
     rows = []
     for entry in study.published:
         if entry.quantity != "porosity" or entry.cohesion_kJ_m3 is None or entry.friction is None:
@@ -138,7 +143,7 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
         values = replicates.loc[here, "porosity_as_published"].to_numpy(np.float64)
         if values.size < 2:
             continue
-        mean, sd = float(values.mean()), float(values.std(ddof=1))
+        mean, sd = float(values.mean()), float(pooled[replicates.loc[here, "engine"].iloc[0]])
         rows.append(
             (
                 *(entry.csd, entry.cohesion_kJ_m3, entry.friction, replicates.loc[here, "engine"].iloc[0]),

@@ -101,7 +101,7 @@ def cluster(n=60, seed=5, friction=0.0, cohesion=50e3, gravity=0.0, shift=0.0):
     position = np.empty((0, 3))
     for r in radius:
         while True:
-            p = rng.uniform(0.0, 130e-6, 3) + [0.0, 0.0, HIGH]
+            p = rng.uniform(0.0, 130e-6, 3) + np.array([0.0, 0.0, HIGH])
             if all(np.linalg.norm(p - q) > r + s for q, s in zip(position, radius, strict=False)):
                 break
         position = np.vstack([position, p])

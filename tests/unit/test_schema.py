@@ -1,0 +1,46 @@
+"""The generated files follow from the config model, and the studies shipped follow the schema."""
+
+import difflib
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from filtercake.config_loading import load_study, load_workflow, read_yaml
+from filtercake.schema import ROOT, generated, write
+
+STUDIES = sorted([*(ROOT / "config").glob("*/*.yaml"), ROOT / "config" / "template.yaml"])
+
+
+@pytest.mark.parametrize("path", generated(), ids=str)
+def test_generated_files_are_in_step_with_the_model(path):
+    expected, found = generated()[path], (ROOT / path).read_text(encoding="utf-8")
+    diff = "".join(difflib.unified_diff(found.splitlines(True), expected.splitlines(True), "on disk", "from the model"))
+    assert not diff, f"run `make schemas`:\n{diff}"
+
+
+def test_write_makes_every_file(tmp_path):
+    write(tmp_path)
+    assert {path.relative_to(tmp_path) for path in tmp_path.rglob("*.*")} == set(generated())
+
+
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
+def test_shipped_studies_follow_schema_and_model(path):
+    schema = json.loads((ROOT / "workflow/schemas/study.schema.json").read_text())
+    jsonschema.validate(read_yaml(path), schema)
+    study = load_study(path)
+    assert study.model.sweeps and study.csds
+
+
+def test_the_schema_refuses_what_the_model_refuses():
+    schema = json.loads((ROOT / "workflow/schemas/study.schema.json").read_text())
+    study = read_yaml(ROOT / "config/template.yaml")
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**study, "colour": "red"}, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**study, "material": {"density_kg_m3": -1}}, schema)
+
+
+def test_the_workflow_configuration_is_valid():
+    assert load_workflow(read_yaml(Path(ROOT / "config/config.yaml")), "config/config.yaml").studies == ["pmma"]
