@@ -6,6 +6,7 @@ reference of its keys are generated from it.
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Annotated, Any, Literal
 
@@ -23,7 +24,7 @@ FRICTIONLESS_TIME_STEP = 0.36
 FRICTIONAL_TIME_STEP = 0.2
 """The same at mu > 0: rotation on several tangential springs is the fastest motion, and limits the step."""
 
-NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")
+NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 """What a study or a distribution may be called: it names files and folders."""
 
 
@@ -42,7 +43,7 @@ def _number(value: Any) -> Any:
 def _whole(value: Any) -> Any:
     value = _number(value)
     if isinstance(value, float):
-        if value != int(value):
+        if not math.isfinite(value) or value != int(value):
             raise ValueError("must be a whole number")
         return int(value)
     return value

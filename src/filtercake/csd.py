@@ -195,12 +195,17 @@ def read_csd(path: Path) -> CrystalSizeDistribution:
         If the file cannot be read, a column or its unit is missing, or the classes are not a distribution.
     """
     rows = _read_rows(path)
-    header = [split_header(cell) for cell in rows[0]]
+    header = [split_header(cell) for cell in rows[0][1]]
     size_column, size_factor = _column(path, header, "size", LENGTH_UNITS, default=None)
     share_column, share_factor = _column(path, header, "volume_fraction", FRACTION_UNITS, default="")
+    for line, row in rows[1:]:
+        if len(row) > len(header):
+            raise CsdError(
+                f"{path}: line {line}: {len(row)} values under {len(header)} columns (decimal commas? use points)"
+            )
     try:
-        sizes = [_number(path, line, row, size_column) * size_factor for line, row in enumerate(rows[1:], 2)]
-        shares = [_number(path, line, row, share_column) * share_factor for line, row in enumerate(rows[1:], 2)]
+        sizes = [_number(path, line, row, size_column) * size_factor for line, row in rows[1:]]
+        shares = [_number(path, line, row, share_column) * share_factor for line, row in rows[1:]]
         return CrystalSizeDistribution.from_classes(sizes, shares)
     except CsdError as error:
         message = str(error)
@@ -259,10 +264,12 @@ def _check_classes(sizes: FloatArray, fractions: FloatArray) -> None:
         raise CsdError(f"the volume fractions sum to {total:.6g}; they must sum to 1 within {SUM_TOLERANCE:g}")
 
 
-def _read_rows(path: Path) -> list[list[str]]:
+def _read_rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Rows that are not blank, with their line numbers."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
+            reader = csv.reader(stream)
+            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except OSError as error:
         raise CsdError(f"{path}: cannot be read ({error.strerror})") from None
     except (UnicodeDecodeError, csv.Error) as error:

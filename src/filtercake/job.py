@@ -46,7 +46,7 @@ def job(log: str | Path) -> Iterator[logging.Logger]:
     try:
         yield logger
     except FiltercakeError as error:
-        logger.error("%s%s", FAILURE, error)
+        logger.error("%s%s", FAILURE, "; ".join(str(error).splitlines()))
         print(f"filtercake: {error}", file=sys.stderr)
         sys.exit(1)
     except Exception as error:

@@ -211,7 +211,6 @@ def test_no_engine_sees_a_cloud_that_is_none(change: dict[str, object], says: st
         Cloud(**{**good_cloud_values(), **change})  # type: ignore[arg-type]
 
 
-@pytest.mark.xfail(strict=True, raises=IndexError, reason="src: make_cloud(particles=0) is an IndexError")
 def test_zero_particles_are_refused(small_csd: CrystalSizeDistribution) -> None:
     with pytest.raises(CloudError):
         make_cloud(small_csd, 0, 0.65, 1)

@@ -369,9 +369,6 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
         read_csd(tmp_path)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="src: a row with more cells than the header is read as if the rest were not there"
-)
 def test_unquoted_decimal_commas_are_never_read_as_another_distribution(tmp_path: Path) -> None:
     # 20,1 and 50,0 um with 100 % and 0 %... meant: 20.1 um 0.5, 50.0 um 0.5
     path = tmp_path / "user.csv"
@@ -380,7 +377,6 @@ def test_unquoted_decimal_commas_are_never_read_as_another_distribution(tmp_path
         read_csd(path)
 
 
-@pytest.mark.xfail(strict=True, reason="src: lines are counted after blank ones are dropped")
 def test_the_line_number_of_an_error_counts_blank_lines(tmp_path: Path) -> None:
     path = tmp_path / "user.csv"
     path.write_text("size_um,volume_fraction\n\n\n20,0.5\nfifty,0.5\n", encoding="utf-8")

@@ -118,7 +118,6 @@ def test_a_log_that_is_missing_or_no_text_gives_no_reason(tmp_path: Path) -> Non
     assert failure_reason(tmp_path / "bytes.log") == ""
 
 
-@pytest.mark.xfail(strict=True, reason="src: of an error of several lines only the first one is read back")
 def test_a_reason_of_several_lines_is_read_back_whole(tmp_path: Path) -> None:
     error = ConfigError([Problem("a.yaml", "x", "1", "no"), Problem("b.yaml", "y", "2", "no")])
     with pytest.raises(SystemExit), job(tmp_path / "job.log"):

@@ -99,6 +99,8 @@ def make_cloud(csd: CrystalSizeDistribution, particles: int, void_fraction: floa
     CloudError
         If a sphere finds no free place (void fraction too small for a narrow distribution).
     """
+    if particles < 1:
+        raise CloudError("the cloud holds no sphere; particles must be at least 1")
     counts = csd.class_counts(particles)
     radius = np.repeat(0.5 * csd.size[::-1], counts[::-1])
     length = box_length(csd, particles, void_fraction)

@@ -110,7 +110,7 @@ class Packing:
                 raise PackingRejected([f"{npz.name} is not the file that was accepted (checksum differs)"])
             with np.load(npz) as data:
                 return cls(data["position"], data["radius"], float(data["length"]), record)
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
             raise PackingRejected([f"{npz.name} cannot be read: {error}"]) from None
 
 

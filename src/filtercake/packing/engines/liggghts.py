@@ -220,9 +220,10 @@ def read_dump(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
         If the dump is missing, empty, cut short, or not the table the deck asks for (transient: try again).
     """
     try:
-        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
+        text = path.read_text(encoding="ascii", errors="replace")
     except OSError as error:
         raise EngineError(f"the final dump cannot be read: {error.strerror}", transient=True) from None
+    lines = text.splitlines()
     start = next((k for k, line in enumerate(lines) if line.startswith("ITEM: ATOMS")), None)
     if start is None or len(lines) < 5 or tuple(lines[start].split()[2:]) != _COLUMNS:
         raise EngineError("the final dump is empty or cut short (no atom table)", transient=True)
@@ -231,8 +232,10 @@ def read_dump(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
         table = np.array([line.split() for line in lines[start + 1 :]], dtype=np.float64)
     except ValueError:
         raise EngineError("the final dump is cut short or garbled in a row", transient=True) from None
-    if table.shape != (promised, len(_COLUMNS)):
+    if table.shape != (promised, len(_COLUMNS)) or not text.endswith("\n"):
         raise EngineError(f"the final dump promises {promised} atoms but holds {len(table)}", transient=True)
+    if np.unique(table[:, 0]).size != promised:
+        raise EngineError("the final dump holds an atom twice", transient=True)
     table = table[np.argsort(table[:, 0])]
     return table[:, 2:5] * micro.LENGTH, table[:, 5:8] * micro.VELOCITY, table[:, 8] * micro.LENGTH
 

@@ -13,10 +13,10 @@ from filtercake.packing.settling import Trajectory
 _VERSION = re.compile(r"^LIGGGHTS \(Version (?P<version>.*?)(?:, compiled|\))")
 _ERROR = re.compile(r"^ERROR(?: on proc \d+)?: (?P<text>.*)")
 _WARNING = re.compile(r"^WARNING(?: on proc \d+)?: *(?P<text>\S.*)")
-_DANGEROUS = re.compile(r"^Dangerous builds = (?P<count>\d+)")
-_INSERTED = re.compile(r"(?:particle insertion|insertion).*?inserted (?P<count>\d+) particle", re.IGNORECASE)
+_DANGEROUS = re.compile(r"^Dangerous builds = (?P<count>\d{1,18})")
+_INSERTED = re.compile(r"(?:particle insertion|insertion).*?inserted (?P<count>\d{1,18}) particle", re.IGNORECASE)
 _STATE = re.compile(r"^@state (?P<values>.+)$")
-_FINISHED = re.compile(r"^@finished (?P<step>\d+)")
+_FINISHED = re.compile(r"^@finished (?P<step>\d{1,18})$")
 _FORCED_END = re.compile(r"SIGTERM|SIGINT|signal \d+|restart.*signal", re.IGNORECASE)
 
 
