@@ -18,6 +18,7 @@ from filtercake.errors import EngineError
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import embedded_kernels as kernels
 from filtercake.packing.engines.base import SettleRequest, parallelism
+from filtercake.packing.pictures import write_vtk
 from filtercake.packing.result import SettledState
 from filtercake.packing.settling import Trajectory
 from filtercake.packing.spec import PackingSpec
@@ -28,6 +29,7 @@ SKIN_DIAMETERS = 0.15
 HORIZON_STEPS = 64
 """Most time steps between two listings of pairs; how far ahead airborne spheres are woken."""
 PROGRESS_SECONDS = 20.0
+CHECKS_PER_PICTURE = 4
 
 
 class Embedded:
@@ -68,7 +70,9 @@ def _settle(bed: Bed, request: SettleRequest, started: float) -> Trajectory:
     rule, spec = request.rule, request.spec
     records = [bed.record()]
     peak, calm, reported = 0.0, 0, started
-    for _ in range(rule.max_checks):
+    for check in range(rule.max_checks):
+        if spec.write_vtk and check % CHECKS_PER_PICTURE == 0:
+            write_vtk(request.folder / f"packing_{bed.step}.vtk", *bed.state(), request.cloud.radius)
         bed.advance(rule.check_steps)
         records.append(bed.record())
         (_, before, _, _), (_, after, energy, _) = records[-2:]
