@@ -32,4 +32,4 @@ onsuccess:
 
 
 onerror:
-    print(console.failure(Path(log)), file=sys.stderr)
+    print(console.failure(Path(RESULTS), POINTS, STARTED), file=sys.stderr)

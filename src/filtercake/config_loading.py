@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -232,20 +232,23 @@ def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
         value, message = "(missing)", "must be given"
     elif item["type"] == "literal_error":
         message = f"allowed: {item['ctx']['expected']}"
-    elif message.startswith("Input should"):
-        message = "must" + message.removeprefix("Input should")
     elif item["type"] == "too_short":
         message = "must hold at least one value"
+    elif " should " in message:
+        message = "must " + message.partition(" should ")[2]
     return Problem(file, key, value, message)
 
 
 def _allowed_keys(model: type[BaseModel], location: list[Any]) -> list[str]:
     """Keys of the part of the model that a location leads to."""
+    named_by_user = False
     for part in location:
-        if isinstance(part, int) or not hasattr(model, "model_fields"):
-            continue
-        if part in model.model_fields:
-            model = _inner_model(model.model_fields[part].annotation) or model
+        if isinstance(part, int) or named_by_user:
+            named_by_user = False
+        elif part in model.model_fields:
+            annotation = model.model_fields[part].annotation
+            named_by_user = get_origin(annotation) is dict
+            model = _inner_model(annotation) or model
     return list(model.model_fields)
 
 

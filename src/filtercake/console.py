@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -13,9 +12,6 @@ from filtercake.study import Point
 
 SHOWN = 5
 """Failed packings listed by name; the rest is in the table."""
-
-_FAILED_JOB = re.compile(r"Error in rule (?P<rule>\w+):.*?\n(?P<body>(?:[ ]{4}.*\n)+)")
-_JOB_LOG = re.compile(r"^\s*log: (?P<log>\S+)", re.MULTILINE)
 
 Points = Mapping[str, Mapping[str, Point]]
 """Points by study and name."""
@@ -52,16 +48,29 @@ def success(results: Path, points: Points) -> str:
     return "\n".join(lines)
 
 
-def failure(snakemake_log: Path) -> str:
-    """Name the jobs that failed, their reasons and logs, and the command that resumes."""
-    text = snakemake_log.read_text(encoding="utf-8", errors="replace") if snakemake_log.is_file() else ""
-    jobs: dict[tuple[str, str], None] = {}
-    for match in _FAILED_JOB.finditer(text):
-        found = _JOB_LOG.search(match["body"])
-        jobs[match["rule"], found["log"] if found else ""] = None
+def failure(results: Path, points: Points, since: float) -> str:
+    """Name the jobs that failed, their reasons and logs, and the command that resumes.
+
+    Parameters
+    ----------
+    results : Path
+        Folder of the results.
+    points : mapping
+        Points by study and name.
+    since : float
+        When the run started, s since the epoch: older logs speak of older runs.
+    """
     lines = []
-    for rule, log in jobs:
-        reason = failure_reason(Path(log)) if log else ""
-        lines += [f"\nfailed: {rule} {Path(log).stem}", f"  reason: {reason or 'see the log'}", f"  log:    {log}"]
+    for study in points:
+        folder = results / study / "logs"
+        for log in sorted(folder.rglob("*.log")):
+            reason = failure_reason(log) if log.stat().st_mtime >= since else ""
+            if reason:
+                name = " ".join(log.relative_to(folder).with_suffix("").parts)
+                lines += [f"\nfailed: {name} ({study})", f"  reason: {reason}", f"  log:    {log}"]
+    if not lines:
+        lines.append(
+            "\nfailed; no job says why: it was stopped from outside, or Snakemake's own message above says more"
+        )
     lines.append("\nFinished packings are kept. Resume with: make resume (or: snakemake --cores 2 --rerun-incomplete)")
     return "\n".join(lines)

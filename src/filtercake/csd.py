@@ -241,7 +241,16 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
 
 
 def from_table(table: pd.DataFrame) -> tuple[CrystalSizeDistribution, CrystalSizeDistribution]:
-    """Read back the full and the truncated distribution from :func:`to_table`'s columns."""
+    """Read back the full and the truncated distribution from :func:`to_table`'s columns.
+
+    Raises
+    ------
+    CsdError
+        If a column is missing or the classes are not a distribution.
+    """
+    missing = {"size_um", "volume_fraction", "truncated_volume_fraction"} - set(table.columns)
+    if missing:
+        raise CsdError(f"the table of a size distribution lacks the columns {', '.join(sorted(missing))}")
     size = table["size_um"].to_numpy(np.float64) * MICROMETRE
     full = CrystalSizeDistribution.from_classes(size, table["volume_fraction"].to_numpy(np.float64))
     truncated = CrystalSizeDistribution.from_classes(size, table["truncated_volume_fraction"].to_numpy(np.float64))

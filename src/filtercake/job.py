@@ -50,9 +50,11 @@ def job(log: str | Path) -> Iterator[logging.Logger]:
         print(f"filtercake: {error}", file=sys.stderr)
         sys.exit(1)
     except Exception as error:
+        # the traceback is for whoever mends the program: it goes to the log, the user gets one line
         logger.error("%s", traceback.format_exc())
         logger.error("%s%s: %s", FAILURE, type(error).__name__, error)
-        raise
+        print(f"filtercake: unexpected {type(error).__name__}: {error} (traceback in {path})", file=sys.stderr)
+        sys.exit(1)
     finally:
         signal.signal(signal.SIGTERM, previous)
         logger.removeHandler(handler)

@@ -525,7 +525,7 @@ def test_studies_on_the_command_line_are_split_at_commas(given_: Any) -> None:
         ({"studies": []}, "studies", "must hold at least one value"),
         ({"studies": ""}, "studies", "must hold at least one value"),
         ({"studies": [3]}, "studies[0]", "must be a valid string"),
-        ({"results": ""}, "results", "should have at least 1 character"),
+        ({"results": ""}, "results", "must have at least 1 character"),
     ],
 )
 def test_a_wrong_workflow_value_is_named(values: dict[str, Any], key: str, says: str) -> None:

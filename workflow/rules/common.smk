@@ -2,6 +2,7 @@
 # with every problem of every file when something is wrong.
 import os
 import sys
+import time
 from pathlib import Path
 
 from filtercake import console, engine_choice
@@ -42,6 +43,7 @@ except FiltercakeError as error:
     stop(error)
 
 RESULTS = settings.results
+STARTED = time.time()
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
 
 

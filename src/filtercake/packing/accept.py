@@ -87,6 +87,8 @@ def is_settled(state: SettledState, rule: StopRule) -> bool:
 def _why_unsettled(state: SettledState) -> str:
     """Tell a bed that needs more time from one that the time step keeps moving."""
     energy = state.trajectory.kinetic_energy
+    if energy.size == 0:
+        return "the engine left no record of the settling"
     earlier, last = energy[-energy.size // 2 :].mean(), energy[-max(1, energy.size // 10) :].mean()
     if energy.size >= 20 and last > STEADY_ENERGY * earlier and last > ENERGY_FRACTION * energy.max():
         return (

@@ -25,6 +25,7 @@ EXECUTABLE_VARIABLE = "FILTERCAKE_LIGGGHTS"
 EXECUTABLES = ("liggghts", "lmp_auto", "lmp_liggghts")
 TEMPLATE_FOLDER_VARIABLE = "FILTERCAKE_TEMPLATES"
 PROGRESS_SECONDS = 20.0
+LOOK_SECONDS = 5.0
 
 _COLUMNS = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
 
@@ -121,19 +122,27 @@ class _Watcher:
 
     def __init__(self, screen: Path, request: SettleRequest):
         self.screen, self.request = screen, request
-        self.reported = time.monotonic()
+        self.looked = self.reported = time.monotonic()
 
     def __call__(self) -> None:
-        if time.monotonic() - self.reported < PROGRESS_SECONDS:
+        now = time.monotonic()
+        if now - self.looked < LOOK_SECONDS:
             return
-        self.reported = time.monotonic()
-        with self.screen.open("rb") as stream:
-            stream.seek(0, os.SEEK_END)
-            stream.seek(max(0, stream.tell() - 4096))
-            tail = parse_log(stream.read().decode("utf-8", "replace"))
-        if tail.states.size:
+        self.looked = now
+        tail = self._tail()
+        if tail.forced_end:
+            # one of several ranks that is asked to stop waits for the others for ever
+            raise EngineError("LIGGGHTS was asked to stop by a signal and did not end", transient=True)
+        if now - self.reported >= PROGRESS_SECONDS and tail.states.size:
+            self.reported = now
             step, height = int(tail.states[-1, 0]), tail.states[-1, 1]
             self.request.progress(f"step {step:,}, mean height of the spheres {height:.1f} um")
+
+    def _tail(self) -> LiggghtsLog:
+        with self.screen.open("rb") as stream:
+            stream.seek(0, os.SEEK_END)
+            stream.seek(max(0, stream.tell() - 8192))
+            return parse_log(stream.read().decode("utf-8", "replace"))
 
 
 @cache

@@ -52,7 +52,8 @@ def run(
     EngineError
         If the program cannot be started, or the time limit is reached (transient).
     """
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    # ranks that wait must yield: two of them on one core would otherwise hardly advance
+    environment = {"OMPI_MCA_mpi_yield_when_idle": "1", **os.environ, "OMP_NUM_THREADS": "1"}
     with output.open("wb") as stream:
         try:
             process = subprocess.Popen(
