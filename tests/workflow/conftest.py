@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from filtercake.packing.engines.liggghts import find_executable
-
 PROJECT = Path(__file__).resolve().parents[2]
 PARTS = ("Snakefile", "config", "workflow", "profiles", "liggghts_templates", "src")
 TINY = "config/test/tiny.yaml"
@@ -63,19 +61,13 @@ def copy_project(target: Path) -> Checkout:
     return Checkout(target)
 
 
-@pytest.fixture(scope="session")
-def needs_liggghts():
-    if find_executable() is None:
-        pytest.skip("LIGGGHTS is not installed")
-
-
 @pytest.fixture
 def checkout(tmp_path):
     return copy_project(tmp_path / "project")
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory, needs_liggghts):
+def finished(tmp_path_factory):
     """A copy in which the tiny study has been run once."""
     checkout = copy_project(tmp_path_factory.mktemp("finished") / "project")
     done = checkout.run()

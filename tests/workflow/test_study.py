@@ -11,8 +11,6 @@ import pytest
 from filtercake.figures.catalogue import FIGURES
 from filtercake.study import REPLICATE_COLUMNS, SUMMARY_COLUMNS
 
-pytestmark = pytest.mark.liggghts
-
 AFTER_PACKING = {"replicates", "summary", "tables", "figure", "provenance"}
 
 
