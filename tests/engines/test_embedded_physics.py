@@ -211,7 +211,7 @@ def test_spheres_as_wide_as_the_box_pile_up():
     assert np.sort(state.position[:, 2]) == pytest.approx(RADIUS * (1.0 + math.sqrt(2.0) * np.arange(3)), rel=0.01)
 
 
-def test_zero_gravity_ends_and_is_refused():
+def test_without_gravity_nothing_moves():
     bed = pair(1e-6, 0.0, spec())
     bed.advance(10_000)
     assert opening(bed) == (pytest.approx(1e-6), 0.0)

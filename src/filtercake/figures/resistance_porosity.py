@@ -52,7 +52,7 @@ def draw(data: StudyData) -> Figure:
     if any(line.get_gid() == "published" and np.min(line.get_ydata()) == 0.0 for line in axes.get_lines()):
         notes.append("markers on the abscissa: no resistance published")
     if any(value.low is not None for name in names for value in selection.published(data, name, "resistance_m_kg")):
-        notes.append("dotted: only a range is published")
+        notes.append("dotted: only a range follows from the text")
     if rows.empty:
         notes.append("no point at the base material")
     style.footer(figure, rows, *notes)
