@@ -16,6 +16,9 @@ from numba import njit, prange
 
 from filtercake.units import FloatArray, IntArray
 
+Unsigned = np.ndarray[Any, np.dtype[np.uint64]]
+Neighbours = np.ndarray[Any, np.dtype[np.uint32]]
+
 
 class Grid(NamedTuple):
     """Cells of every size level: first sphere of each cell, cells per axis, first cell, largest radius, cell side."""
@@ -27,23 +30,67 @@ class Grid(NamedTuple):
     cell_size: FloatArray
 
 
-SAME_IMAGE = 4
+class Pairs(NamedTuple):
+    """Pairs by sphere: ``first[i]:last[i]`` are those of sphere i.
+
+    Attributes
+    ----------
+    first, last : ndarray, shape (n,)
+        Range of each sphere's pairs.
+    neighbour : ndarray, shape (m,)
+        The other sphere, and in the upper bits a code of its periodic image.
+    constants : ndarray, shape (m, 2)
+        What of the contact law takes roots and does not change while the pair lasts.
+    spring : ndarray, shape (m, 3)
+        Tangential springs, m; one row without friction.
+    """
+
+    first: Unsigned
+    last: Unsigned
+    neighbour: Neighbours
+    constants: FloatArray
+    spring: FloatArray
+
+
+class Law(NamedTuple):
+    """The contact law's numbers that are the same for all pairs, and gravity; SI.
+
+    ``shear_stiffness`` and ``shear_damping`` are the tangential constants over the normal ones.
+    """
+
+    gravity: float
+    cohesion: float
+    friction: float
+    shear_stiffness: float
+    shear_damping: float
+
+
+# columns of the state: one sphere is one cache line
+X, Y, Z, RADIUS, U, V, W, MASS = range(8)
+
+FUSED = {"contract"}
+"""Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
+
+# indices are unsigned: signed ones cost a test for negative values at every access
+IMAGE_SHIFT = np.uint32(28)
+INDEX_MASK = np.uint32(2**28 - 1)
+SAME_IMAGE = np.uint32(4)
 """Code of a neighbour in the box itself, not in one of its eight periodic images."""
 
 # columns of a pair's constants
-RADIUS_SUM, RADIUS_DIFFERENCE_SQUARED, STIFFNESS, DAMPING, SHEAR_STIFFNESS, SHEAR_DAMPING = range(6)
+STIFFNESS, DAMPING = range(2)
 
 
 @njit(cache=True)
 def sort_into_cells(
-    position: FloatArray, level: IntArray, cell_size: FloatArray, length: float, top: float
+    state: FloatArray, level: IntArray, cell_size: FloatArray, length: float, top: float
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """Assign spheres to the cells of their size level and find the order that makes cells contiguous.
 
     Parameters
     ----------
-    position : ndarray, shape (n, 3)
-        Centres, x and y in [0, length).
+    state : ndarray, shape (n, 8)
+        Spheres; x and y in [0, length).
     level : ndarray, shape (n,)
         Size level of each sphere, 0 the coarsest.
     cell_size : ndarray, shape (levels,)
@@ -70,9 +117,9 @@ def sort_into_cells(
     for i in range(n):
         k = level[i]
         across = shape[k, 0]
-        cx = min(int(position[i, 0] / length * across), across - 1)
-        cy = min(int(position[i, 1] / length * across), across - 1)
-        cz = min(max(int(position[i, 2] / cell_size[k]), 0), shape[k, 2] - 1)
+        cx = min(int(state[i, X] / length * across), across - 1)
+        cy = min(int(state[i, Y] / length * across), across - 1)
+        cz = min(max(int(state[i, Z] / cell_size[k]), 0), shape[k, 2] - 1)
         cell[i] = offset[k] + (cz * across + cy) * across + cx
         start[cell[i] + 1] += 1
     for c in range(offset[levels]):
@@ -86,29 +133,26 @@ def sort_into_cells(
 
 
 @njit(cache=True)
-def find_pairs(
-    position: FloatArray,
-    radius: FloatArray,
+def _find_pairs(
+    part: int,
+    bounds: IntArray,
+    state: FloatArray,
     level: IntArray,
     grid: Grid,
     length: float,
     skin: float,
-    first: IntArray,
-    neighbour: np.ndarray[Any, np.dtype[np.int32]],
-    image: np.ndarray[Any, np.dtype[np.int8]],
+    first: Unsigned,
+    last: Unsigned,
+    neighbour: Neighbours,
 ) -> int:
-    """List pairs closer than ``skin``, each once, by sphere (spheres sorted into cells); return how many.
-
-    ``first[i]:first[i + 1]`` are sphere i's neighbours; ``image`` codes the neighbour's periodic image. When
-    the arrays are too short, the number returned is larger than their size and they hold only a part.
-    """
+    """List the pairs of one part's spheres in its share of the list; return how many they are."""
     start, shape, offset, largest, cell_size = grid
-    n = radius.size
-    capacity = neighbour.size
+    room = neighbour.size // (bounds.size - 1)
+    begin_at = part * room
     count = 0
-    for i in range(n):
-        first[i] = count
-        x, y, z, r = position[i, 0], position[i, 1], position[i, 2], radius[i]
+    for i in range(bounds[part], bounds[part + 1]):
+        first[i] = begin_at + count
+        x, y, z, r = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
         own = level[i]
         for k in range(own + 1):
             reach = r + largest[k] + skin
@@ -134,72 +178,305 @@ def find_pairs(
                         if k == own:
                             begin = max(begin, i + 1)  # each pair once
                         for j in range(begin, start[c + 1]):
-                            dx = xs - position[j, 0]
-                            dy = ys - position[j, 1]
-                            dz = z - position[j, 2]
-                            near = r + radius[j] + skin
+                            dx = xs - state[j, X]
+                            dy = ys - state[j, Y]
+                            dz = z - state[j, Z]
+                            near = r + state[j, RADIUS] + skin
                             if dx * dx + dy * dy + dz * dz < near * near:
-                                if count < capacity:
-                                    neighbour[count] = j
-                                    image[count] = (wrap_y + 1) * 3 + wrap_x + 1
+                                if count < room:
+                                    code = np.uint32((wrap_y + 1) * 3 + wrap_x + 1)
+                                    neighbour[begin_at + count] = np.uint32(j) | (code << IMAGE_SHIFT)
                                 count += 1
-    first[n] = count
+        last[i] = begin_at + count
     return count
 
 
+@cache
+def make_find_pairs(threaded: bool) -> Callable[..., int]:
+    """Compile the search for pairs, for one thread or several."""
+
+    @njit(cache=True, parallel=threaded)
+    def find_pairs(
+        bounds: IntArray,
+        state: FloatArray,
+        level: IntArray,
+        grid: Grid,
+        length: float,
+        skin: float,
+        first: Unsigned,
+        last: Unsigned,
+        neighbour: Neighbours,
+    ) -> int:
+        """List pairs closer than ``skin``, each once, by sphere (spheres sorted into cells).
+
+        ``first[i]:last[i]`` are sphere i's neighbours, the periodic image in the upper bits. The spheres
+        of part t, ``bounds[t]:bounds[t + 1]``, have the t-th share of the list to themselves. Returns the largest
+        number of pairs in one part: when it is more than a share holds, the list holds only a part of them.
+        """
+        parts = bounds.size - 1
+        counts = np.zeros(parts, dtype=np.int64)
+        for t in prange(parts):
+            counts[t] = _find_pairs(t, bounds, state, level, grid, length, skin, first, last, neighbour)
+        return int(counts.max())
+
+    compiled: Callable[..., int] = find_pairs
+    return compiled
+
+
 @njit(cache=True)
-def pair_constants(
-    radius: FloatArray,
-    mass: FloatArray,
-    first: IntArray,
-    neighbour: np.ndarray[Any, np.dtype[np.int32]],
-    modulus: float,
-    shear_modulus: float,
-    damping_ratio: float,
-    constants: FloatArray,
-) -> None:
-    """Fill each pair's constants: all of the contact law that does not change while the pair lasts."""
+def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_ratio: float) -> None:
+    """Fill each pair's constants."""
+    first, last, neighbour, constants, _ = pairs
     damping = 2.0 * math.sqrt(5.0 / 6.0) * damping_ratio
-    for i in range(radius.size):
-        for p in range(first[i], first[i + 1]):
-            j = neighbour[p]
-            root = math.sqrt(radius[i] * radius[j] / (radius[i] + radius[j]))
-            reduced = mass[i] * mass[j] / (mass[i] + mass[j])
-            constants[p, RADIUS_SUM] = radius[i] + radius[j]
-            constants[p, RADIUS_DIFFERENCE_SQUARED] = (radius[i] - radius[j]) ** 2
+    for i in range(first.size):
+        for p in range(first[i], last[i]):
+            j = neighbour[p] & INDEX_MASK
+            a, b = state[i, RADIUS], state[j, RADIUS]
+            root = math.sqrt(a * b / (a + b))
+            reduced = state[i, MASS] * state[j, MASS] / (state[i, MASS] + state[j, MASS])
             constants[p, STIFFNESS] = 4.0 / 3.0 * modulus * root
             constants[p, DAMPING] = damping * math.sqrt(2.0 * modulus * root * reduced)
-            if constants.shape[1] > SHEAR_STIFFNESS:
-                constants[p, SHEAR_STIFFNESS] = 8.0 * shear_modulus * root
-                constants[p, SHEAR_DAMPING] = damping * math.sqrt(8.0 * shear_modulus * root * reduced)
 
 
 @njit(cache=True)
-def carry_springs(
-    order: IntArray,
-    old_first: IntArray,
-    old_neighbour: np.ndarray[Any, np.dtype[np.int32]],
-    old_spring: FloatArray,
-    first: IntArray,
-    neighbour: np.ndarray[Any, np.dtype[np.int32]],
-    spring: FloatArray,
-) -> None:
+def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
     """Carry tangential springs over to a new pair list; ``order[i]`` is where sphere i stood before, -1 if new."""
-    for i in range(first.size - 1):
+    old_first, old_last, old_neighbour, _, old_spring = old
+    first, last, neighbour, _, spring = new
+    for i in range(first.size):
         old_i = order[i]
-        for p in range(first[i], first[i + 1]):
+        for p in range(first[i], last[i]):
             spring[p, 0] = spring[p, 1] = spring[p, 2] = 0.0
-            old_j = order[neighbour[p]]
+            old_j = order[neighbour[p] & INDEX_MASK]
             if old_i < 0 or old_j < 0:
                 continue
-            for q in range(old_first[old_i], old_first[old_i + 1]):
-                if old_neighbour[q] == old_j:
+            for q in range(old_first[old_i], old_last[old_i]):
+                if (old_neighbour[q] & INDEX_MASK) == old_j:
                     for k in range(3):
                         spring[p, k] = old_spring[q, k]
-            for q in range(old_first[old_j], old_first[old_j + 1]):
-                if old_neighbour[q] == old_i:
+            for q in range(old_first[old_j], old_last[old_j]):
+                if (old_neighbour[q] & INDEX_MASK) == old_i:
                     for k in range(3):
                         spring[p, k] = -old_spring[q, k]
+
+
+@njit(cache=True, error_model="numpy", fastmath=FUSED)
+def _limit_spring(
+    hx: float, hy: float, hz: float, stiffness: float, allowed: float
+) -> tuple[float, float, float, bool]:
+    """Shorten a tangential spring to the Coulomb limit; say whether the contact slides."""
+    stretched = stiffness * math.sqrt(hx * hx + hy * hy + hz * hz)
+    if stretched <= allowed:
+        return hx, hy, hz, False
+    ratio = allowed / stretched
+    return hx * ratio, hy * ratio, hz * ratio, True
+
+
+@cache
+def _make_pair_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
+    """Compile the forces between spheres for one kind of scene."""
+
+    @njit(cache=True, error_model="numpy", fastmath=FUSED)
+    def pair_forces(
+        begin: int,
+        end: int,
+        state: FloatArray,
+        spin: FloatArray,
+        force: FloatArray,
+        torque: FloatArray,
+        pairs: Pairs,
+        law: Law,
+        length: float,
+        spring_step: float,
+    ) -> None:
+        """Add the forces and torques of the pairs of spheres ``begin`` to ``end``; ``force`` has shape (n, 3)."""
+        first, last, neighbour, constants, spring = pairs
+        lens_factor = 0.25 * math.pi * law.cohesion
+        for i in range(begin, end):
+            xi, yi, zi, ri = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
+            ui, vi, wi = state[i, U], state[i, V], state[i, W]
+            fx, fy, fz = 0.0, 0.0, 0.0
+            tx, ty, tz = 0.0, 0.0, 0.0
+            for p in range(first[i], last[i]):
+                j = neighbour[p] & INDEX_MASK
+                code = neighbour[p] >> IMAGE_SHIFT
+                dx, dy, dz = xi - state[j, X], yi - state[j, Y], zi - state[j, Z]
+                if code != SAME_IMAGE:
+                    dx -= (np.int64(code) % 3 - 1) * length
+                    dy -= (np.int64(code) // 3 - 1) * length
+                square = dx * dx + dy * dy + dz * dz
+                rj = state[j, RADIUS]
+                total = ri + rj
+                if square >= total * total:
+                    if frictional:
+                        spring[p, 0] = spring[p, 1] = spring[p, 2] = 0.0
+                    continue
+                r = math.sqrt(square)
+                inverse = 1.0 / r
+                overlap = total - r
+                root = math.sqrt(overlap)
+                quarter = math.sqrt(root)
+                du, dv, dw = ui - state[j, U], vi - state[j, V], wi - state[j, W]
+                normal_speed = (du * dx + dv * dy + dw * dz) * inverse
+                normal = constants[p, STIFFNESS] * overlap * root - constants[p, DAMPING] * quarter * normal_speed
+                push = normal
+                if cohesive:
+                    lens = overlap * (total + r) * (square - (ri - rj) * (ri - rj))
+                    push -= lens_factor * lens * (inverse * inverse)
+                push *= inverse
+                gx, gy, gz = push * dx, push * dy, push * dz
+                if frictional:
+                    nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
+                    arm_i, arm_j = ri - 0.5 * overlap, rj - 0.5 * overlap
+                    ox = arm_i * spin[i, 0] + arm_j * spin[j, 0]
+                    oy = arm_i * spin[i, 1] + arm_j * spin[j, 1]
+                    oz = arm_i * spin[i, 2] + arm_j * spin[j, 2]
+                    sx = du - normal_speed * nx - (nz * oy - ny * oz)
+                    sy = dv - normal_speed * ny - (nx * oz - nz * ox)
+                    sz = dw - normal_speed * nz - (ny * ox - nx * oy)
+                    hx = spring[p, 0] + sx * spring_step
+                    hy = spring[p, 1] + sy * spring_step
+                    hz = spring[p, 2] + sz * spring_step
+                    along = hx * nx + hy * ny + hz * nz
+                    stiffness = law.shear_stiffness * constants[p, STIFFNESS] * root
+                    hx, hy, hz, slides = _limit_spring(
+                        hx - along * nx, hy - along * ny, hz - along * nz, stiffness, law.friction * abs(normal)
+                    )
+                    drag = 0.0 if slides else law.shear_damping * constants[p, DAMPING] * quarter
+                    px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
+                    spring[p, 0], spring[p, 1], spring[p, 2] = hx, hy, hz
+                    gx += px
+                    gy += py
+                    gz += pz
+                    mx, my, mz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
+                    tx -= arm_i * mx
+                    ty -= arm_i * my
+                    tz -= arm_i * mz
+                    torque[j, 0] -= arm_j * mx
+                    torque[j, 1] -= arm_j * my
+                    torque[j, 2] -= arm_j * mz
+                fx += gx
+                fy += gy
+                fz += gz
+                force[j, 0] -= gx
+                force[j, 1] -= gy
+                force[j, 2] -= gz
+            force[i, 0] += fx
+            force[i, 1] += fy
+            force[i, 2] += fz
+            if frictional:
+                torque[i, 0] += tx
+                torque[i, 1] += ty
+                torque[i, 2] += tz
+
+    compiled: Callable[..., None] = pair_forces
+    return compiled
+
+
+@cache
+def _make_floor_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
+    """Compile the forces of the floor for one kind of scene."""
+
+    @njit(cache=True, error_model="numpy", fastmath=FUSED)
+    def floor_forces(
+        grounded: IntArray,
+        state: FloatArray,
+        spin: FloatArray,
+        force: FloatArray,
+        torque: FloatArray,
+        floor: FloatArray,
+        floor_spring: FloatArray,
+        law: Law,
+        spring_step: float,
+    ) -> None:
+        """Add the floor's forces and torques on the spheres listed in ``grounded``."""
+        for k in range(grounded.size):
+            i = grounded[k]
+            z, radius = state[i, Z], state[i, RADIUS]
+            overlap = radius - z
+            if overlap <= 0.0:
+                if frictional:
+                    floor_spring[i, 0] = floor_spring[i, 1] = 0.0
+                continue
+            root = math.sqrt(overlap)
+            quarter = math.sqrt(root)
+            normal = floor[i, STIFFNESS] * overlap * root - floor[i, DAMPING] * quarter * state[i, W]
+            force[i, 2] += normal
+            if cohesive:
+                force[i, 2] -= math.pi * law.cohesion * overlap * (radius + z)
+            if frictional:
+                arm = z + 0.5 * overlap
+                sx, sy = state[i, U] - arm * spin[i, 1], state[i, V] + arm * spin[i, 0]
+                stiffness = law.shear_stiffness * floor[i, STIFFNESS] * root
+                hx, hy, _, slides = _limit_spring(
+                    floor_spring[i, 0] + sx * spring_step,
+                    floor_spring[i, 1] + sy * spring_step,
+                    0.0,
+                    stiffness,
+                    law.friction * abs(normal),
+                )
+                drag = 0.0 if slides else law.shear_damping * floor[i, DAMPING] * quarter
+                px, py = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy
+                floor_spring[i, 0], floor_spring[i, 1] = hx, hy
+                force[i, 0] += px
+                force[i, 1] += py
+                torque[i, 0] += arm * py
+                torque[i, 1] -= arm * px
+
+    compiled: Callable[..., None] = floor_forces
+    return compiled
+
+
+@cache
+def _make_move(frictional: bool) -> Callable[..., float]:
+    """Compile one step of the equations of motion."""
+
+    @njit(cache=True, error_model="numpy", fastmath=FUSED)
+    def move(
+        begin: int,
+        end: int,
+        state: FloatArray,
+        spin: FloatArray,
+        force: FloatArray,
+        torque: FloatArray,
+        reference: FloatArray,
+        kick: float,
+        time_step: float,
+        frame: float,
+    ) -> float:
+        """Kick and move spheres ``begin`` to ``end``; return the largest squared distance from their reference."""
+        farthest = 0.0
+        for i in range(begin, end):
+            scale = kick / state[i, MASS]
+            u = state[i, U] + scale * force[i, 0]
+            v = state[i, V] + scale * force[i, 1]
+            w = state[i, W] + scale * force[i, 2]
+            x = state[i, X] + time_step * u
+            y = state[i, Y] + time_step * v
+            z = state[i, Z] + time_step * w
+            state[i, U], state[i, V], state[i, W] = u, v, w
+            state[i, X], state[i, Y], state[i, Z] = x, y, z
+            moved_x, moved_y, moved_z = x - reference[i, 0], y - reference[i, 1], z - reference[i, 2] - frame
+            away = moved_x * moved_x + moved_y * moved_y + moved_z * moved_z
+            if frictional:
+                turn = scale / (0.4 * state[i, RADIUS] * state[i, RADIUS])
+                for k in range(3):
+                    spin[i, k] += turn * torque[i, k]
+            if not away <= farthest:  # keeps what is not a number, too
+                farthest = away
+        return farthest
+
+    compiled: Callable[..., float] = move
+    return compiled
+
+
+@njit(cache=True)
+def _disturbed(state: FloatArray, watched: IntArray) -> bool:
+    """Whether one of the watched spheres was touched: until then it falls straight down, to the last bit."""
+    disturbed = False
+    for i in watched:
+        disturbed |= state[i, U] != 0.0 or state[i, V] != 0.0
+    return disturbed
 
 
 @cache
@@ -208,216 +485,91 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
 
     A threaded loop gives each thread a share of the pairs and a force buffer of its own.
     """
+    pair_forces = _make_pair_forces(cohesive, frictional)
+    floor_forces = _make_floor_forces(cohesive, frictional)
+    move = _make_move(frictional)
 
-    @njit(cache=True, error_model="numpy", parallel=threaded)
+    @njit(cache=True, error_model="numpy", fastmath=FUSED, parallel=threaded)
     def advance(
         steps: int,
         ready: bool,
         starting: bool,
-        hold_springs: bool,
-        position: FloatArray,
-        velocity: FloatArray,
+        state: FloatArray,
         spin: FloatArray,
         force: FloatArray,
         torque: FloatArray,
-        radius: FloatArray,
-        mass: FloatArray,
         floor: FloatArray,
         floor_spring: FloatArray,
+        pairs: Pairs,
         bounds: IntArray,
-        first: IntArray,
-        neighbour: np.ndarray[Any, np.dtype[np.int32]],
-        image: np.ndarray[Any, np.dtype[np.int8]],
-        constants: FloatArray,
-        spring: FloatArray,
         reference: FloatArray,
+        watched: IntArray,
+        grounded: IntArray,
+        law: Law,
         length: float,
-        gravity: float,
-        cohesion: float,
-        friction: float,
         time_step: float,
         drift_limit: float,
+        frame: float,
+        frame_step: float,
     ) -> tuple[int, bool]:
         """Advance up to ``steps``; return the steps done and whether the forces at the new positions are known.
 
-        It stops early, forces unknown, when a sphere has moved by ``drift_limit`` since the pairs were listed.
-        ``hold_springs`` says that the springs already know these positions (at the start, or when the forces
-        are asked for a second time). ``force`` and ``torque`` have one layer per thread, shape (threads, n, 3);
-        the first ends as the total. ``bounds`` (threads + 1,) are the spheres whose pairs each thread works on.
+        It stops early, forces unknown, when a sphere has moved by ``drift_limit`` since the pairs were listed, or
+        when one of the ``watched`` spheres, which have neighbours that are not in the list, has been touched.
+        Movement is seen from a frame that has risen by ``frame`` and rises by ``frame_step`` per step: only
+        relative movement opens or closes a pair. ``force`` and ``torque`` have one layer per thread, shape
+        (threads, n, 3); the first ends as the total. ``bounds`` (threads + 1,) are the spheres whose pairs each
+        thread works on, ``grounded`` the spheres that may touch the floor.
         """
-        n = radius.size
+        n = state.shape[0]
         parts = bounds.size - 1
         done = 0
         limit = drift_limit * drift_limit
-        area_factor = 0.25 * math.pi * cohesion
         drift = np.zeros(parts)
         while True:
             if not ready:
-                spring_step = 0.0 if hold_springs else time_step
-                hold_springs = False
+                spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
                     for i in range(n):
-                        force[t, i, 0] = force[t, i, 1] = force[t, i, 2] = 0.0
+                        force[t, i, 0] = force[t, i, 1] = 0.0
+                        force[t, i, 2] = -law.gravity * state[i, MASS] if t == 0 else 0.0
                         if frictional:
                             torque[t, i, 0] = torque[t, i, 1] = torque[t, i, 2] = 0.0
-                    for i in range(bounds[t], bounds[t + 1]):
-                        xi, yi, zi = position[i, 0], position[i, 1], position[i, 2]
-                        ui, vi, wi = velocity[i, 0], velocity[i, 1], velocity[i, 2]
-                        fx, fy, fz = 0.0, 0.0, 0.0
-                        tx, ty, tz = 0.0, 0.0, 0.0
-                        for p in range(first[i], first[i + 1]):
-                            j = neighbour[p]
-                            code = image[p]
-                            dx = xi - position[j, 0]
-                            dy = yi - position[j, 1]
-                            dz = zi - position[j, 2]
-                            if code != SAME_IMAGE:
-                                dx -= (code % 3 - 1) * length
-                                dy -= (code // 3 - 1) * length
-                            square = dx * dx + dy * dy + dz * dz
-                            total = constants[p, RADIUS_SUM]
-                            if square >= total * total:
-                                if frictional:
-                                    spring[p, 0] = spring[p, 1] = spring[p, 2] = 0.0
-                                continue
-                            r = math.sqrt(square)
-                            inverse = 1.0 / r
-                            nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
-                            overlap = total - r
-                            root = math.sqrt(overlap)
-                            quarter = math.sqrt(root)
-                            du, dv, dw = ui - velocity[j, 0], vi - velocity[j, 1], wi - velocity[j, 2]
-                            normal_speed = du * nx + dv * ny + dw * nz
-                            elastic = constants[p, STIFFNESS] * overlap * root
-                            normal = elastic - constants[p, DAMPING] * quarter * normal_speed
-                            push = normal
-                            if cohesive:
-                                lens = overlap * (total + r) * (square - constants[p, RADIUS_DIFFERENCE_SQUARED])
-                                push -= area_factor * lens * (inverse * inverse)
-                            gx, gy, gz = push * nx, push * ny, push * nz
-                            if frictional:
-                                arm_i = radius[i] - 0.5 * overlap
-                                arm_j = radius[j] - 0.5 * overlap
-                                ox = arm_i * spin[i, 0] + arm_j * spin[j, 0]
-                                oy = arm_i * spin[i, 1] + arm_j * spin[j, 1]
-                                oz = arm_i * spin[i, 2] + arm_j * spin[j, 2]
-                                sx = du - normal_speed * nx - (nz * oy - ny * oz)
-                                sy = dv - normal_speed * ny - (nx * oz - nz * ox)
-                                sz = dw - normal_speed * nz - (ny * ox - nx * oy)
-                                hx = spring[p, 0] + sx * spring_step
-                                hy = spring[p, 1] + sy * spring_step
-                                hz = spring[p, 2] + sz * spring_step
-                                along = hx * nx + hy * ny + hz * nz
-                                hx -= along * nx
-                                hy -= along * ny
-                                hz -= along * nz
-                                stiffness = constants[p, SHEAR_STIFFNESS] * root
-                                stretched = stiffness * math.sqrt(hx * hx + hy * hy + hz * hz)
-                                allowed = friction * abs(normal)
-                                if stretched > allowed:
-                                    ratio = allowed / stretched
-                                    hx *= ratio
-                                    hy *= ratio
-                                    hz *= ratio
-                                    px, py, pz = -stiffness * hx, -stiffness * hy, -stiffness * hz
-                                else:
-                                    drag = constants[p, SHEAR_DAMPING] * quarter
-                                    px = -stiffness * hx - drag * sx
-                                    py = -stiffness * hy - drag * sy
-                                    pz = -stiffness * hz - drag * sz
-                                spring[p, 0], spring[p, 1], spring[p, 2] = hx, hy, hz
-                                gx += px
-                                gy += py
-                                gz += pz
-                                mx, my, mz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-                                tx -= arm_i * mx
-                                ty -= arm_i * my
-                                tz -= arm_i * mz
-                                torque[t, j, 0] -= arm_j * mx
-                                torque[t, j, 1] -= arm_j * my
-                                torque[t, j, 2] -= arm_j * mz
-                            fx += gx
-                            fy += gy
-                            fz += gz
-                            force[t, j, 0] -= gx
-                            force[t, j, 1] -= gy
-                            force[t, j, 2] -= gz
-                        force[t, i, 0] += fx
-                        force[t, i, 1] += fy
-                        force[t, i, 2] += fz
-                        if frictional:
-                            torque[t, i, 0] += tx
-                            torque[t, i, 1] += ty
-                            torque[t, i, 2] += tz
-                for t in prange(parts):
-                    for i in range(t * n // parts, (t + 1) * n // parts):
-                        for other in range(1, parts):
-                            for k in range(3):
-                                force[0, i, k] += force[other, i, k]
-                                if frictional:
-                                    torque[0, i, k] += torque[other, i, k]
-                        force[0, i, 2] -= mass[i] * gravity
-                        overlap = radius[i] - position[i, 2]
-                        if overlap <= 0.0:
-                            if frictional:
-                                floor_spring[i, 0] = floor_spring[i, 1] = 0.0
-                            continue
-                        root = math.sqrt(overlap)
-                        quarter = math.sqrt(root)
-                        normal = floor[i, 0] * overlap * root - floor[i, 1] * quarter * velocity[i, 2]
-                        force[0, i, 2] += normal
-                        if cohesive:
-                            force[0, i, 2] -= 4.0 * area_factor * overlap * (radius[i] + position[i, 2])
-                        if frictional:
-                            arm = position[i, 2] + 0.5 * overlap
-                            sx = velocity[i, 0] - arm * spin[i, 1]
-                            sy = velocity[i, 1] + arm * spin[i, 0]
-                            hx = floor_spring[i, 0] + sx * spring_step
-                            hy = floor_spring[i, 1] + sy * spring_step
-                            stiffness = floor[i, 2] * root
-                            stretched = stiffness * math.sqrt(hx * hx + hy * hy)
-                            allowed = friction * abs(normal)
-                            if stretched > allowed:
-                                ratio = allowed / stretched
-                                hx *= ratio
-                                hy *= ratio
-                                px, py = -stiffness * hx, -stiffness * hy
-                            else:
-                                drag = floor[i, 3] * quarter
-                                px = -stiffness * hx - drag * sx
-                                py = -stiffness * hy - drag * sy
-                            floor_spring[i, 0], floor_spring[i, 1] = hx, hy
-                            force[0, i, 0] += px
-                            force[0, i, 1] += py
-                            torque[0, i, 0] += arm * py
-                            torque[0, i, 1] -= arm * px
+                    pair_forces(
+                        bounds[t], bounds[t + 1], state, spin, force[t], torque[t], pairs, law, length, spring_step
+                    )
+                if parts > 1:
+                    for t in prange(parts):
+                        for i in range(t * n // parts, (t + 1) * n // parts):
+                            for other in range(1, parts):
+                                for k in range(3):
+                                    force[0, i, k] += force[other, i, k]
+                                    if frictional:
+                                        torque[0, i, k] += torque[other, i, k]
+                floor_forces(grounded, state, spin, force[0], torque[0], floor, floor_spring, law, spring_step)
                 ready = True
             if done == steps:
                 return done, ready
             kick = 0.5 * time_step if starting else time_step
             starting = False
+            frame += frame_step
             for t in prange(parts):
-                farthest = 0.0
-                for i in range(t * n // parts, (t + 1) * n // parts):
-                    scale = kick / mass[i]
-                    away = 0.0
-                    for k in range(3):
-                        velocity[i, k] += scale * force[0, i, k]
-                        position[i, k] += time_step * velocity[i, k]
-                        moved = position[i, k] - reference[i, k]
-                        away += moved * moved
-                    if frictional:
-                        turn = scale / (0.4 * radius[i] * radius[i])
-                        for k in range(3):
-                            spin[i, k] += turn * torque[0, i, k]
-                    if not away <= farthest:  # keeps what is not a number, too
-                        farthest = away
-                drift[t] = farthest
+                drift[t] = move(
+                    t * n // parts,
+                    (t + 1) * n // parts,
+                    state,
+                    spin,
+                    force[0],
+                    torque[0],
+                    reference,
+                    kick,
+                    time_step,
+                    frame,
+                )
             done += 1
             ready = False
-            for t in range(parts):
-                if not drift[t] < limit:
-                    return done, ready
+            if not max(drift.max(), frame * frame) < limit or _disturbed(state, watched):
+                return done, ready
 
     compiled: Callable[..., tuple[int, bool]] = advance
     return compiled

@@ -1,0 +1,351 @@
+"""The bed of the embedded engine: spheres that have met something, spheres still falling, and the time loop.
+
+Only what moves relative to something is computed: spheres in free fall follow one known parabola and join the bed,
+with its pairs and forces, when something that has left the parabola comes near them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from filtercake import contact
+from filtercake.errors import EngineError
+from filtercake.packing.cloud import Cloud
+from filtercake.packing.engines import embedded_kernels as kernels
+from filtercake.packing.spec import PackingSpec
+from filtercake.units import GRAVITY, FloatArray, IntArray
+
+SKIN_DIAMETERS = (0.08, 0.6)
+"""Narrowest and widest neighbour skin, over the smallest diameter."""
+LISTING_STEPS = 80
+"""Time steps that a list of pairs should last: the skin follows from it and from the fastest sphere."""
+HORIZON_STEPS = 128
+"""Most time steps between two listings while spheres are airborne."""
+MARGIN_DIAMETERS = 0.05
+"""Height over the bed up to which falling spheres are in the pair list, over the largest diameter."""
+CEILING_BOXES = 5.0
+"""Height over the box side, or over the cloud's, at which a bed counts as exploded."""
+
+
+def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
+    """Make an empty pair list with room for ``capacity`` pairs."""
+    return kernels.Pairs(
+        np.zeros(spheres, dtype=np.uint64),
+        np.zeros(spheres, dtype=np.uint64),
+        np.empty(capacity, dtype=np.uint32),
+        np.empty((capacity, 2)),
+        np.zeros((capacity if frictional else 1, 3)),
+    )
+
+
+class Bed:
+    """Spheres in the bed, spheres still in free fall, and the time loop.
+
+    The first ``count`` rows of the arrays are in the bed, sorted into cells; the rest is airborne, lowest first.
+    Airborne rows hold the state at release. Spheres in the bed that nothing has touched yet still fall on the
+    parabola; they are there because the touched ones may soon reach them.
+    """
+
+    def __init__(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        radius: FloatArray,
+        length: float,
+        spec: PackingSpec,
+        gravity: float = GRAVITY,
+        threads: int = 1,
+    ):
+        """Start from positions (n, 3) m, velocities (n, 3) m/s and radii (n,) m; every sphere is in the bed."""
+        n = radius.size
+        self.gravity, self.threads = gravity, threads
+        self.spec, self.length, self.total = spec, length, n
+        self.frictional = spec.friction > 0.0
+        self.spheres = np.column_stack([position, radius, velocity, spec.density * 4.0 / 3.0 * np.pi * radius**3])
+        self.position, self.velocity = self.spheres[:, :3], self.spheres[:, 4:7]
+        self.radius, self.mass = self.spheres[:, 3], self.spheres[:, 7]
+        self.spin = np.zeros((n, 3))
+        self.touched = np.ones(n, dtype=np.bool_)
+        self.identity = np.arange(n)
+        self.floor_spring = np.zeros((n, 2))
+        self.level = np.floor(np.log2(radius.max() / radius) + 1e-12).astype(np.int64)
+        self.largest = np.array(
+            [radius[self.level == k].max(initial=0.0) for k in range(int(self.level.max()) + 1)], dtype=np.float64
+        )
+        self.smallest = 2.0 * float(radius.min())
+        self.bottom = position[:, 2] - radius  # at release; rows of airborne spheres count
+        self.ceiling = CEILING_BOXES * max(length, float(position[:, 2].max(initial=0.0)))
+        self._set_material()
+        self.force = np.zeros((threads, n, 3))
+        self.torque = np.zeros((threads, n if self.frictional else 1, 3))
+        self.bounds = np.zeros(threads + 1, dtype=np.int64)
+        self.reference = np.zeros((n, 3))
+        self.watched = np.empty(0, dtype=np.int64)
+        self.grounded = np.empty(0, dtype=np.int64)
+        self.pairs = _no_pairs(0, 8 * n + 64 * threads, self.frictional)
+        self.skin, self.frame_step = 0.0, 0.0
+        self.count = n
+        self.step = 0
+        self.ready, self.starting, self.listed = False, True, False
+        self.listed_at = 0  # step of the last listing
+        self.horizon = 0  # step at which airborne spheres are looked at again
+        self.kernel = kernels.make_advance(spec.cohesion > 0.0, self.frictional, threads > 1)
+        self.find_pairs = kernels.make_find_pairs(threads > 1)
+
+    @classmethod
+    def from_cloud(cls, cloud: Cloud, spec: PackingSpec, threads: int = 1) -> Bed:
+        """Start from a cloud of spheres falling together: all airborne."""
+        order = np.argsort(cloud.position[:, 2] - cloud.radius, kind="stable")
+        velocity = np.zeros_like(cloud.position)
+        velocity[:, 2] = -spec.settling_velocity
+        bed = cls(cloud.position[order], velocity, cloud.radius[order], cloud.length, spec, threads=threads)
+        bed.identity = order
+        bed.touched[:] = False
+        bed.count = 0
+        bed.starting = False
+        return bed
+
+    def _set_material(self) -> None:
+        spec = self.spec
+        self.modulus = contact.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
+        shear = contact.shear_modulus(spec.youngs_modulus, spec.poisson_ratio) / (2.0 * (2.0 - spec.poisson_ratio))
+        self.damping_ratio = contact.damping_ratio(spec.restitution)
+        self.law = kernels.Law(
+            float(self.gravity),
+            float(spec.cohesion),
+            float(spec.friction),
+            6.0 * shear / self.modulus,  # 8 G* over 4/3 E*
+            math.sqrt(4.0 * shear / self.modulus),  # root of 8 G* over 2 E*
+        )
+        damping = 2.0 * math.sqrt(5.0 / 6.0) * self.damping_ratio
+        root = np.sqrt(self.radius)
+        self.floor = np.column_stack(
+            [4.0 / 3.0 * self.modulus * root, damping * np.sqrt(2.0 * self.modulus * root * self.mass)]
+        )
+
+    @property
+    def down(self) -> int:
+        """Number of spheres that have met the floor or another sphere."""
+        return int(self.touched[: self.count].sum())
+
+    def fallen(self, step: int) -> float:
+        """Distance an airborne sphere has fallen after ``step`` steps, m."""
+        t = step * self.spec.time_step
+        return self.spec.settling_velocity * t + 0.5 * self.gravity * t * t
+
+    def falling_speed(self, step: float) -> float:
+        """Speed of an airborne sphere after ``step`` steps, m/s."""
+        return self.spec.settling_velocity + self.gravity * step * self.spec.time_step
+
+    def advance(self, steps: int) -> None:
+        """Advance by ``steps`` time steps; afterwards the forces at the positions are known."""
+        end = self.step + steps
+        while self.step < end or (self.count and not self.ready):
+            airborne = self.count < self.total
+            if self.listed and airborne and self.step >= self.horizon:
+                self.listed = False
+            if not self.listed:
+                self._prepare()
+                if self.count == 0:
+                    self.step = min(end, self._first_wake(end))
+                    continue
+            until = min(end, self.horizon) if self.count < self.total else end
+            self.step += self._run(until - self.step)
+
+    def _run(self, steps: int) -> int:
+        n = self.count
+        done, self.ready = self.kernel(
+            steps,
+            self.ready,
+            self.starting,
+            self.spheres[:n],
+            self.spin[:n],
+            self.force,
+            self.torque,
+            self.floor[:n],
+            self.floor_spring[:n],
+            self.pairs,
+            self.bounds,
+            self.reference[:n],
+            self.watched,
+            self.grounded,
+            self.law,
+            self.length,
+            self.spec.time_step,
+            0.5 * self.skin,
+            self.frame_step * (self.step - self.listed_at),
+            self.frame_step,
+        )
+        self.starting = self.starting and done == 0
+        self.listed = self.ready
+        return int(done)
+
+    def _prepare(self) -> None:
+        """Wake the airborne spheres that the bed may reach, and list the pairs."""
+        self._mark_touched()
+        falling = self.count < self.total or not self.touched.all()
+        # half way between what falls and what lies: neither moves more than half as much in this frame
+        self.frame_step = -0.5 * self.falling_speed(self.step) * self.spec.time_step if falling else 0.0
+        self.skin = self._choose_skin()
+        while self._wake():  # what was woken may be about to meet the floor itself
+            self._mark_touched()
+        if self.count:
+            self._list_pairs()
+            self._watch()
+
+    def _mark_touched(self) -> None:
+        """Note which spheres have left the parabola, or will meet the floor before they are looked at again.
+
+        A sphere that another has touched moves sideways; until then its sideways velocity is nothing to the last bit.
+        """
+        n = self.count
+        ahead = self.fallen(self.step + HORIZON_STEPS) - self.fallen(self.step)
+        self.touched[:n] |= (self.velocity[:n, 0] != 0.0) | (self.velocity[:n, 1] != 0.0)
+        self.touched[:n] |= self.position[:n, 2] - self.radius[:n] < ahead
+
+    def _choose_skin(self) -> float:
+        """Skin, m, that lasts ``LISTING_STEPS`` at the present speeds, within bounds set by the smallest size."""
+        if self.spec.skin > 0.0:
+            return self.spec.skin
+        n, step = self.count, self.spec.time_step
+        relative = self.velocity[:n].copy()
+        relative[:, 2] -= self.frame_step / step
+        speed = math.sqrt(float(np.einsum("ij,ij->i", relative, relative).max(initial=0.0)))
+        wanted = 2.0 * max(speed, abs(self.frame_step) / step) * step * LISTING_STEPS
+        low, high = SKIN_DIAMETERS
+        return min(max(wanted, low * self.smallest), high * self.smallest)
+
+    def _line(self, step: int, top: float) -> float:
+        """Height at release below which spheres join a bed of height ``top`` (m) at a step, to last a horizon."""
+        return top + self.skin + MARGIN_DIAMETERS * 2.0 * float(self.largest[0]) + self.fallen(step + HORIZON_STEPS)
+
+    def _wake(self) -> bool:
+        """Move the airborne spheres that the touched ones may reach soon into the bed; say whether there were any."""
+        first = self.count
+        if first == self.total:
+            return False
+        touched = self.touched[:first]
+        top = float((self.position[:first, 2] + self.radius[:first])[touched].max(initial=0.0))
+        last = first + int(np.searchsorted(self.bottom[first:], self._line(self.step, top)))
+        self.position[first:last, 2] -= self.fallen(self.step)
+        # velocities are kept half a step back
+        self.velocity[first:last, 2] = -self.falling_speed(self.step - 0.5)
+        self.force[0, first:last] = 0.0
+        self.force[0, first:last, 2] = -self.gravity * self.mass[first:last]
+        self.count = last
+        return last > first
+
+    def _first_wake(self, end: int) -> int:
+        """First step at which a sphere comes near the floor, at most ``end``, at least one further."""
+        low, high = self.step + 1, end
+        while low < high:
+            middle = (low + high) // 2
+            if self.bottom[0] < self._line(middle, 0.0):
+                high = middle
+            else:
+                low = middle + 1
+        return low
+
+    def _watch(self) -> None:
+        """Note the spheres that may meet the floor, and those that may have airborne neighbours.
+
+        The time loop stops when one of the latter is touched.
+        """
+        n = self.count
+        # the frame and a sphere in it move by half a skin each before the next listing
+        self.grounded = np.flatnonzero(self.position[:n, 2] - self.radius[:n] < self.skin)
+        self.horizon = self.step + HORIZON_STEPS
+        if n == self.total:
+            self.watched = np.empty(0, dtype=np.int64)
+            return
+        until = self.fallen(self.horizon)
+        reach = self.position[:n, 2] + self.radius[:n] + self.skin + until
+        self.watched = np.flatnonzero(reach > self.bottom[n])
+
+    def _list_pairs(self) -> None:
+        """Sort the bed into cells and list its pairs anew; tangential springs are carried over."""
+        n = self.count
+        self.position[:n, :2] %= self.length
+        top = float(self.position[:n, 2].max())
+        if not top < self.ceiling:
+            raise EngineError("the bed exploded: spheres fly far above where they started; use a shorter time step")
+        cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
+        order, start, shape, offset = kernels.sort_into_cells(
+            self.spheres[:n], self.level[:n], cell_size, self.length, max(top, 0.0)
+        )
+        for array in self._arrays():
+            array[:n] = array[:n][order]
+        pairs = self._find_pairs(kernels.Grid(start, shape, offset, self.largest, cell_size))
+        kernels.pair_constants(self.spheres[:n], pairs, self.modulus, self.damping_ratio)
+        if self.frictional:
+            self._carry_springs(order, pairs)
+        self.pairs = pairs
+        self._share_work()
+        self.reference[:n] = self.position[:n]
+        self.listed, self.listed_at = True, self.step
+
+    def _find_pairs(self, grid: kernels.Grid) -> kernels.Pairs:
+        n, capacity = self.count, self.pairs.neighbour.size
+        # without springs to carry over, the old list's room serves again
+        pairs = _no_pairs(0, capacity, True) if self.frictional else self.pairs
+        first, last = np.empty(n, dtype=np.uint64), np.empty(n, dtype=np.uint64)
+        self.bounds[:] = np.linspace(0, n, self.threads + 1).astype(np.int64)
+        spheres, level = self.spheres[:n], self.level[:n]
+        while True:
+            count = self.find_pairs(
+                self.bounds, spheres, level, grid, self.length, self.skin, first, last, pairs.neighbour
+            )
+            if count <= pairs.neighbour.size // self.threads:
+                return pairs._replace(first=first, last=last)
+            pairs = _no_pairs(0, int(1.3 * count) * self.threads, self.frictional)
+
+    def _carry_springs(self, order: IntArray, pairs: kernels.Pairs) -> None:
+        origin = np.where(order < self.pairs.first.size, order, -1)
+        kernels.carry_springs(origin, self.pairs, pairs)
+
+    def _share_work(self) -> None:
+        """Give every thread as many pairs as the others."""
+        done = np.cumsum(self.pairs.last - self.pairs.first)
+        shares = np.arange(1, self.threads) * (done[-1] / self.threads)
+        self.bounds[1:-1] = np.searchsorted(done, shares)
+        self.bounds[0], self.bounds[-1] = 0, self.count
+
+    def _arrays(self) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.generic]], ...]:
+        arrays = [self.spheres, self.floor, self.force[0], self.identity, self.level, self.touched]
+        return (*arrays, self.spin, self.torque[0], self.floor_spring) if self.frictional else tuple(arrays)
+
+    def _now(self) -> tuple[FloatArray, FloatArray]:
+        """Positions and full-step velocities in the engine's own order."""
+        n = self.count
+        position, velocity = self.position.copy(), self.velocity.copy()
+        half = 0.0 if self.starting else 0.5 * self.spec.time_step
+        velocity[:n] += half * self.force[0, :n] / self.mass[:n, None]
+        position[n:, 2] -= self.fallen(self.step)
+        velocity[n:, 2] = -self.falling_speed(self.step)
+        return position, velocity
+
+    def state(self) -> tuple[FloatArray, FloatArray]:
+        """Positions (n, 3) m and velocities (n, 3) m/s in the order of the cloud, x and y in the box."""
+        position, velocity = self._now()
+        position[:, :2] %= self.length
+        back = np.argsort(self.identity)
+        return position[back], velocity[back]
+
+    def full_spin(self) -> FloatArray:
+        """Full-step angular velocities (n, 3), rad/s, in the order of the cloud."""
+        spin = self.spin.copy()
+        if self.frictional and not self.starting:
+            inertia = 0.4 * self.mass * self.radius**2
+            spin[: self.count] += (0.5 * self.spec.time_step * self.torque[0] / inertia[:, None])[: self.count]
+        return spin[np.argsort(self.identity)]
+
+    def record(self) -> tuple[float, float, float, float]:
+        """Time s, mean height m, kinetic energy J, and the paper's sample porosity."""
+        position, velocity = self._now()
+        height = float(np.average(position[:, 2], weights=self.mass))
+        energy = float(0.5 * np.sum(self.mass * np.sum(velocity**2, axis=1)))
+        sampled = (position[:, 2] >= 0.0) & (position[:, 2] <= self.length)
+        porosity = 1.0 - float(self.mass[sampled].sum()) / self.spec.density / self.length**3
+        return self.step * self.spec.time_step, height, energy, porosity
