@@ -8,7 +8,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run test test-all lint format schemas figures regression speed resume retry lock setup clean help
+.PHONY: run test test-all lint format schemas figures regression speed agreement resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -48,6 +48,9 @@ regression: setup ## the paper's protocol against its authors' own numbers (abou
 
 speed: setup ## tuned deck against the paper's protocol, one core (about 20 min)
 	$(BIN)/snakemake --cores 1 speed
+
+agreement: setup ## both engines on the same clouds, nine cases (about 45 min on 2 cores; needs LIGGGHTS)
+	$(SNAKEMAKE) agreement
 
 resume: setup ## go on after a kill or a crash; finished packings are kept
 	$(BIN)/snakemake --unlock $(CONFIG) >/dev/null 2>&1 || true

@@ -28,8 +28,8 @@ onstart:
 
 
 onsuccess:
-    print(console.success(Path(RESULTS), POINTS))
+    print(console.success(Path(RESULTS), points_of_run()))
 
 
 onerror:
-    print(console.failure(Path(RESULTS), POINTS, STARTED), file=sys.stderr)
+    print(console.failure(Path(RESULTS), points_of_run(), STARTED), file=sys.stderr)

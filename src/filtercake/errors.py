@@ -76,3 +76,11 @@ class PackingRejected(FiltercakeError):  # noqa: N818
         self.reasons = tuple(reasons)
         self.transient = transient
         super().__init__("; ".join(self.reasons))
+
+
+class CrystallizerError(FiltercakeError):
+    """A crystallizer has no steady state, or its kinetics are not usable."""
+
+
+class FilterError(FiltercakeError):
+    """A drum filter, or a cake on it, has a value that makes no sense."""

@@ -37,6 +37,28 @@ def sources(module: str) -> tuple[Path, ...]:
     start = _file_of(module)
     if start is None:
         raise FileNotFoundError(f"filtercake has no module {module!r}")
+    return tuple(sorted(_closure(start)))
+
+
+@cache
+def packing_sources(engine: str) -> tuple[Path, ...]:
+    """List the files behind packings by one engine: an edit of another engine leaves its packings alone.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such engine.
+    """
+    registry, start = _file_of("packing.engines"), _file_of(f"packing.engines.{engine}")
+    if registry is None or start is None:
+        raise FileNotFoundError(f"filtercake has no engine {engine!r}")
+    own = _closure(start, closed=registry)
+    others = set(registry.parent.glob("*.py")) - own
+    return tuple(path for path in sources("packing.pack") if path not in others)
+
+
+def _closure(start: Path, closed: Path | None = None) -> set[Path]:
+    """Collect a file and all it imports; what ``closed`` imports is not followed."""
     found: set[Path] = set()
     waiting = [start]
     while waiting:
@@ -45,8 +67,9 @@ def sources(module: str) -> tuple[Path, ...]:
             continue
         found.add(path)
         waiting += [parent / "__init__.py" for parent in path.parents if ROOT in (parent, *parent.parents)]
-        waiting += _imports(path)
-    return tuple(sorted(found))
+        if path != closed:
+            waiting += _imports(path)
+    return found
 
 
 def code_hash(files: tuple[Path, ...] | list[Path]) -> str:

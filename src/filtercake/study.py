@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +117,13 @@ class Point:
             "youngs_modulus_MPa": _tidy(self.spec.youngs_modulus / MEGAPASCAL),
             "engine": self.spec.engine,
         }
+
+
+def with_engine(study: LoadedStudy, engine: str) -> LoadedStudy:
+    """Return the same study made by another engine, under a name that says so."""
+    packing = study.model.packing.model_copy(update={"engine": engine})
+    model = study.model.model_copy(update={"packing": packing})
+    return replace(study, name=f"{study.name}_{engine}", model=model)
 
 
 def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution, int], str]) -> list[Point]:

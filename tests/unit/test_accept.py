@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from filtercake.errors import PackingRejected
-from filtercake.packing.accept import accept, is_settled, overlap_limit
+from filtercake.packing.accept import _outside, accept, is_settled, overlap_limit
 from filtercake.packing.result import SettledState
 from filtercake.packing.settling import Trajectory
 
@@ -165,15 +165,35 @@ def test_spheres_outside_the_region_are_refused(
 def test_the_overlap_limit_by_hand(make_spec: Callable[..., Any]) -> None:
     # 1.5 times the overlap of a small sphere on a flat one, plus half a percent; d_eq/d of equal spheres at 50 kJ/m3:
     equal = (3 * np.pi * 50e3 * 0.96 / 5e6) ** 2 / 4
-    assert overlap_limit(make_spec(cohesion=50e3)) == pytest.approx(3.0 * equal + 0.005, rel=1e-12)
-    assert overlap_limit(make_spec(cohesion=0.0)) == 0.005
+    # and twice the Hertz overlap of the small sphere under the weight of the large one
+    small, large = 16e-6, 270e-6
+    for cohesive, spec in ((3.0 * equal, make_spec(cohesion=50e3)), (0.0, make_spec(cohesion=0.0))):
+        weight = spec.density * 4 / 3 * np.pi * large**3 * 9.81
+        pressed = (weight * 3 * 2 * 0.96 / (4 * 5e6 * np.sqrt(small))) ** (2 / 3) / (2 * small)
+        expected = pytest.approx(cohesive + 0.005 + 2 * pressed, rel=1e-12)
+        assert overlap_limit(spec, np.array([small, large])) == expected
+
+
+def test_a_small_sphere_still_in_flight_over_a_large_bed_is_no_reason_to_refuse(
+    settled_lattice: SimpleNamespace,
+) -> None:
+    case = settled_lattice
+    copies = 8  # 1200 spheres: one in a thousand may fly
+    position = np.vstack([case.state.position + np.array([k * case.state.length, 0.0, 0.0]) for k in range(copies)])
+    radius = np.tile(case.state.radius, copies)
+    state = dataclasses.replace(case.state, radius=radius, expected=radius.size)
+    for flying, refused in ((1, False), (2, True)):
+        lifted = position.copy()
+        lifted[np.argsort(position[:, 2])[-flying:], 2] = 421 * UM
+        found = _outside(dataclasses.replace(state, position=lifted, length=copies * state.length), case.cloud)
+        assert bool(found) == refused
 
 
 @pytest.mark.parametrize(("share", "accepted"), [(0.9, True), (1.1, False)])
 def test_two_spheres_that_overlap_too_deep_are_refused(
     settled_lattice: SimpleNamespace, share: float, accepted: bool
 ) -> None:
-    limit = overlap_limit(settled_lattice.spec)
+    limit = overlap_limit(settled_lattice.spec, settled_lattice.cloud.radius)
     top = int(np.argmax(settled_lattice.state.position[:, 2]))
     z = settled_lattice.state.position[top, 2] - share * limit * 40 * UM
     position = changed(settled_lattice.state.position, (top, 2), z)

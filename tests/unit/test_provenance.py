@@ -13,7 +13,7 @@ import numpy
 import pytest
 
 from filtercake import provenance
-from filtercake.provenance import ROOT, code_hash, describe, sources, versions
+from filtercake.provenance import ROOT, code_hash, describe, packing_sources, sources, versions
 
 
 def names(module: str) -> set[str]:
@@ -139,3 +139,22 @@ def test_the_commit_is_the_repository_s(tmp_path: Path) -> None:
     assert head.startswith(commit)
     (tmp_path / "f").write_text("2", encoding="utf-8")
     assert describe(tmp_path)["commit"] == f"{commit}-dirty"
+
+
+@pytest.mark.parametrize(
+    ("engine", "own", "others"),
+    [
+        ("embedded", {"embedded.py", "embedded_bed.py", "embedded_kernels.py"}, {"liggghts.py", "liggghts_log.py"}),
+        ("liggghts", {"liggghts.py", "liggghts_log.py", "process.py", "micro.py"}, {"embedded.py", "embedded_bed.py"}),
+        ("liggghts_as_published", {"liggghts_as_published.py", "liggghts.py"}, {"embedded_kernels.py"}),
+    ],
+)
+def test_packings_depend_on_their_own_engine_only(engine: str, own: set[str], others: set[str]) -> None:
+    found = {path.name for path in packing_sources(engine)}
+    assert own | {"base.py", "pack.py", "cloud.py", "accept.py", "settling.py", "contact.py"} <= found
+    assert not others & found
+
+
+def test_an_unknown_engine_has_no_files() -> None:
+    with pytest.raises(FileNotFoundError, match="no engine 'magic'"):
+        packing_sources("magic")

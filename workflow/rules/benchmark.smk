@@ -1,5 +1,49 @@
 # Benchmarks: targets of their own, never part of a study.
 
+# the studies of the comparison of engines, made by each
+AGREEMENT_ENGINES = ["liggghts", "embedded"]
+AGREEMENT = {
+    study.name: study
+    for base in load_studies(
+        sorted((ROOT / "config" / "benchmarks").glob("agreement_*.yaml"))
+    )
+    for study in (with_engine(base, engine) for engine in AGREEMENT_ENGINES)
+}
+KNOWN.update(AGREEMENT)
+KNOWN_POINTS.update(points_by_name(AGREEMENT))
+
+
+rule agreement:
+    input:
+        expand("{results}/benchmark/agreement.csv", results=RESULTS),
+    localrule: True
+
+
+rule compare_engines:
+    input:
+        replicates=expand(
+            "{results}/{study}/replicates.csv", results=RESULTS, study=AGREEMENT
+        ),
+        library=library("agreement"),
+    output:
+        table="{results}/benchmark/agreement.csv",
+        replicates="{results}/benchmark/agreement_replicates.csv",
+    log:
+        "{results}/benchmark/logs/agreement.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/agreement.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        engines=AGREEMENT_ENGINES,
+    message:
+        "comparing the engines' ensembles"
+    script:
+        "../scripts/agreement.py"
+
 
 rule speed:
     input:

@@ -12,8 +12,8 @@ from filtercake.figures import catalogue
 from filtercake.job import PROGRESS_VARIABLE, Progress
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
-from filtercake.provenance import sources
-from filtercake.study import expand as expand_points
+from filtercake.provenance import packing_sources, sources
+from filtercake.study import expand as expand_points, with_engine
 
 ROOT = Path(workflow.basedir)
 CONFIG_FILE = "config/config.yaml"
@@ -24,6 +24,15 @@ def stop(error):
     sys.exit(1)
 
 
+def points_by_name(studies):
+    return {
+        name: {
+            point.name: point for point in expand_points(study, engine_choice.choose)
+        }
+        for name, study in studies.items()
+    }
+
+
 try:
     settings = load_workflow(dict(config), CONFIG_FILE)
     STUDIES = {
@@ -32,16 +41,14 @@ try:
             find_studies(settings, ROOT / "config" / "studies", CONFIG_FILE)
         )
     }
-    POINTS = {
-        name: {
-            point.name: point for point in expand_points(study, engine_choice.choose)
-        }
-        for name, study in STUDIES.items()
-    }
+    POINTS = points_by_name(STUDIES)
     engine_choice.check(STUDIES.values())
 except FiltercakeError as error:
     stop(error)
 
+# what the rules can look up: the studies asked for, and those of benchmarks
+KNOWN = dict(STUDIES)
+KNOWN_POINTS = dict(POINTS)
 RESULTS = settings.results
 STARTED = time.time()
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
@@ -59,18 +66,23 @@ def library(module):
     return [str(path) for path in sources(module)]
 
 
+def packing_library(wildcards):
+    """Those behind a point's packings: of the engines, only the one it uses."""
+    return [str(path) for path in packing_sources(point_of(wildcards).spec.engine)]
+
+
 def study_of(wildcards):
-    return STUDIES[wildcards.study]
+    return KNOWN[wildcards.study]
 
 
 def point_of(wildcards):
-    return POINTS[wildcards.study][wildcards.point]
+    return KNOWN_POINTS[wildcards.study][wildcards.point]
 
 
 def manifests(wildcards):
     return [
         f"{RESULTS}/{wildcards.study}/packings/{point}/{MANIFEST}"
-        for point in POINTS[wildcards.study]
+        for point in KNOWN_POINTS[wildcards.study]
     ]
 
 
@@ -83,11 +95,11 @@ def csd_tables(wildcards):
 
 def point_rows(wildcards):
     """The study's points as plain values, fit for a rule's params."""
-    return [point.as_dict() for point in POINTS[wildcards.study].values()]
+    return [point.as_dict() for point in KNOWN_POINTS[wildcards.study].values()]
 
 
 def figures_of(study):
-    return catalogue.figures_of(POINTS[study].values(), STUDIES[study].model)
+    return catalogue.figures_of(KNOWN_POINTS[study].values(), KNOWN[study].model)
 
 
 def csd_params(wildcards):
@@ -106,6 +118,16 @@ def packing_minutes(wildcards, attempt):
     return min(10_080, attempt * max(30, point_of(wildcards).spec.particles // 100))
 
 
+def points_of_run():
+    """Points by study that the run's jobs are about, whether they are to be made or stand already."""
+    found = {}
+    for job in workflow.dag.jobs:
+        if job.rule.name == "packing":
+            point = point_of(job.wildcards)
+            found.setdefault(job.wildcards.study, {})[point.name] = point
+    return found
+
+
 def packings_to_make():
     """Packings of the jobs that are about to run."""
     jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name == "packing"]
@@ -115,7 +137,7 @@ def packings_to_make():
 def begin_run():
     to_make = packings_to_make()
     Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), to_make)
-    for study in STUDIES.values():
-        for warning in study.warnings:
+    for name in points_of_run():
+        for warning in KNOWN[name].warnings:
             print(f"warning: {warning}", file=sys.stderr)
-    print(console.plan(POINTS, to_make), file=sys.stderr)
+    print(console.plan(points_of_run(), to_make), file=sys.stderr)

@@ -4,7 +4,7 @@
 rule packing:
     input:
         csd=lambda wildcards: f"{RESULTS}/{wildcards.study}/csd/{point_of(wildcards).csd}.csv",
-        library=library("packing.pack"),
+        library=packing_library,
         templates=sorted(
             str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
         ),

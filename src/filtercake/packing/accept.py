@@ -14,11 +14,16 @@ from filtercake.packing.result import SettledState
 from filtercake.packing.settling import ENERGY_FRACTION, StopRule, stopped_falling
 from filtercake.packing.slab import bed_height, interior_slab, why_too_thin
 from filtercake.packing.spec import PackingSpec
+from filtercake.units import GRAVITY, FloatArray
 
 OVERLAP_FACTOR = 1.5
 """Largest overlap allowed, over the equilibrium overlap of a small sphere on a much larger one."""
 OVERLAP_ALLOWANCE = 0.005
 """Overlap of the smaller diameter allowed on top, for the load a contact carries."""
+LOAD_FACTOR = 2.0
+"""Overlap allowed on top of that in a wide distribution, over that of the largest sphere at rest on the smallest."""
+IN_FLIGHT = 1e-3
+"""Share of the spheres that may still fly over the region: small ones are thrown up when large ones land."""
 FIXED_LENGTH_TOLERANCE = 1e-3
 """Fall of porosity allowed over the last tenth of a run of fixed length."""
 
@@ -26,10 +31,14 @@ STEADY_ENERGY = 0.8
 """Kinetic energy of the last tenth over that of the last half above which it is no longer falling."""
 
 
-def overlap_limit(spec: PackingSpec) -> float:
-    """Largest overlap of an acceptable packing over the diameter of the smaller sphere."""
+def overlap_limit(spec: PackingSpec, radius: FloatArray) -> float:
+    """Largest overlap of an acceptable packing of spheres (radii in m) over the diameter of the smaller sphere."""
     equal = contact.relative_overlap(spec.cohesion, spec.youngs_modulus, spec.poisson_ratio)
-    return OVERLAP_FACTOR * 2.0 * equal + OVERLAP_ALLOWANCE
+    smallest, largest = float(radius.min()), float(radius.max())
+    modulus = contact.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
+    weight = spec.density * 4.0 / 3.0 * np.pi * largest**3 * GRAVITY
+    pressed = (weight / (4.0 / 3.0 * modulus * np.sqrt(smallest))) ** (2.0 / 3.0) / (2.0 * smallest)
+    return float(OVERLAP_FACTOR * 2.0 * equal + OVERLAP_ALLOWANCE + LOAD_FACTOR * pressed)
 
 
 def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule) -> dict[str, Any]:
@@ -57,7 +66,7 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
     reasons += _outside(state, cloud)
     contacts = find_contacts(state.position, state.radius, state.length)
     deepest = _deepest(state, contacts)
-    limit = overlap_limit(spec)
+    limit = overlap_limit(spec, cloud.radius)
     if deepest > limit:
         reasons.append(
             f"largest overlap {deepest:.3g} of the smaller diameter is over its limit {limit:.3g}: "
@@ -155,6 +164,8 @@ def _outside(state: SettledState, cloud: Cloud) -> list[str]:
     below = int(np.count_nonzero(z <= 0.0))
     above = int(np.count_nonzero(z > cloud.height + state.radius))
     beside = int(np.count_nonzero((side < 0.0).any(axis=1) | (side > state.length).any(axis=1)))
+    if above <= IN_FLIGHT * state.radius.size:
+        above = 0
     reasons = []
     for count, where in ((below, "below the floor"), (above, "above the region"), (beside, "beside the box")):
         if count:

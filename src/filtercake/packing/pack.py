@@ -70,6 +70,7 @@ def pack(
     *,
     engine: Engine | None = None,
     progress: Report = lambda _: None,
+    state_file: Path | None = None,
 ) -> Packing:
     """Make one packing.
 
@@ -87,6 +88,8 @@ def pack(
         Used instead of the one the spec names.
     progress : callable
         Takes a line about a long packing.
+    state_file : Path, optional
+        Where a long packing keeps its state, to go on from there when it was stopped.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def pack(
     cloud = make_cloud(csd, spec.particles, spec.void_fraction, seed)
     rule = StopRule.for_bed(spec, cloud.length)
     engine_seed = stage_seed(seed, "engine")
-    request = SettleRequest(spec, csd, cloud, rule, engine_seed, folder, progress)
+    request = SettleRequest(spec, csd, cloud, rule, engine_seed, folder, progress, state_file)
     state = (engine or get_engine(spec.engine)).settle(request)
     measured = accept(state, spec, cloud, rule)
     diagnostics = {
@@ -184,12 +187,13 @@ def _attempt(
     progress: Report,
 ) -> tuple[Outcome, dict[str, Any]]:
     seed = cloud_seed(spec, csd, replicate)
+    state_file = _state_file(npz, key)
     for attempt in range(1, ATTEMPTS + 1):
         scratch = work / f"r{replicate}"
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
         try:
-            made = pack(spec, csd, replicate, scratch, engine=engine, progress=progress)
+            made = pack(spec, csd, replicate, scratch, engine=engine, progress=progress, state_file=state_file)
         except EngineMissing:
             raise
         except (CloudError, EngineError, PackingRejected) as error:
@@ -197,12 +201,23 @@ def _attempt(
                 progress(f"replicate {replicate}: {error}; trying again")
                 continue
             _keep_evidence(scratch, npz)
+            state_file.unlink(missing_ok=True)
             return Outcome(replicate, "failed", str(error), seed, "", attempt), {}
         record = {**made.diagnostics, "key": key, "attempts": attempt}
         checksum = Packing(made.position, made.radius, made.length, record).save(npz)
         _keep_pictures(scratch, npz)
+        state_file.unlink(missing_ok=True)
         return Outcome(replicate, "ok", "", seed, checksum, attempt), record
     raise AssertionError("unreachable")
+
+
+def _state_file(npz: Path, key: str) -> Path:
+    """Where a replicate's unfinished state is kept; states of other inputs or code are removed."""
+    wanted = npz.with_name(f"{npz.stem}.{key[:16]}.state.npz")
+    for path in npz.parent.glob(f"{npz.stem}.*.state.npz"):
+        if path != wanted:
+            path.unlink(missing_ok=True)
+    return wanted
 
 
 def _keep_evidence(scratch: Path, npz: Path) -> None:

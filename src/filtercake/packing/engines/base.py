@@ -45,6 +45,8 @@ class SettleRequest:
         Private scratch folder, empty.
     progress : callable
         Called now and then with a line about a long packing.
+    state_file : Path or None
+        Where an engine that can go on from a saved state keeps one; it outlives the folder.
     """
 
     spec: PackingSpec
@@ -54,6 +56,7 @@ class SettleRequest:
     seed: int
     folder: Path
     progress: Progress
+    state_file: Path | None = None
 
 
 class Engine(Protocol):

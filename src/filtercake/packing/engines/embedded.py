@@ -1,13 +1,11 @@
-"""The embedded engine: the same contact law as LIGGGHTS, compiled on the spot, from pip alone.
-
-Only what moves is computed: spheres still in free fall follow one known parabola and join the bed, with its
-pairs and forces, when they come near it.
-"""
+"""The embedded engine: the same contact law as LIGGGHTS, compiled on the spot, from pip alone."""
 
 from __future__ import annotations
 
 import math
 import time
+import zipfile
+from pathlib import Path
 
 import numpy as np
 from numba import get_num_threads, set_num_threads
@@ -17,11 +15,16 @@ from filtercake.errors import EngineError
 from filtercake.packing.engines.base import SettleRequest, parallelism
 from filtercake.packing.engines.embedded_bed import Bed
 from filtercake.packing.pictures import write_vtk
-from filtercake.packing.result import SettledState
-from filtercake.packing.settling import Trajectory
+from filtercake.packing.result import SettledState, publish
+from filtercake.packing.settling import TYPICAL_SOLIDS, Trajectory
+from filtercake.units import FloatArray
 
 PROGRESS_SECONDS = 20.0
+STATE_SECONDS = 60.0
+"""Wall time between two savings of a long bed's state."""
 CHECKS_PER_PICTURE = 4
+REST_AFTER_ARRIVAL = 1.2
+"""Time at which a bed is at rest over that at which its last sphere arrives; for the forecast only."""
 
 
 class Embedded:
@@ -35,49 +38,117 @@ class Embedded:
 
     def settle(self, request: SettleRequest) -> SettledState:
         """Let the cloud settle (see :class:`filtercake.packing.engines.base.Engine`)."""
-        started = time.monotonic()
         threads = parallelism(request.spec)
         if threads > 1:
             set_num_threads(min(threads, get_num_threads()))
-        bed = Bed.from_cloud(request.cloud, request.spec, threads)
-        trajectory = _settle(bed, request, started)
-        position, velocity = bed.state()
+        run = _Run(request, Bed.from_cloud(request.cloud, request.spec, threads))
+        run.resume()
+        run.settle()
+        position, velocity = run.bed.state()
         return SettledState(
             position=position,
             velocity=velocity,
             radius=request.cloud.radius,
-            length=bed.length,
-            trajectory=trajectory,
-            steps=bed.step,
+            length=run.bed.length,
+            trajectory=run.trajectory(),
+            steps=run.bed.step,
             expected=request.cloud.radius.size,
             dangerous_builds=0,
             engine=self.name,
             engine_version=__version__,
-            wall_time=time.monotonic() - started,
+            wall_time=run.spent(),
         )
 
 
-def _settle(bed: Bed, request: SettleRequest, started: float) -> Trajectory:
-    """Advance from check to check until the stop rule holds or its patience ends."""
-    rule, spec = request.rule, request.spec
-    records = [bed.record()]
-    peak, calm, reported = 0.0, 0, started
-    for check in range(rule.max_checks):
-        if spec.write_vtk and check % CHECKS_PER_PICTURE == 0:
-            write_vtk(request.folder / f"packing_{bed.step}.vtk", *bed.state(), request.cloud.radius)
-        bed.advance(rule.check_steps)
-        records.append(bed.record())
-        (_, before, _, _), (_, after, energy, _) = records[-2:]
-        if not math.isfinite(after + energy):
-            raise EngineError("the bed exploded: positions are no longer finite; use a shorter time step")
-        peak = max(peak, energy)
-        calm = calm + 1 if rule.is_calm(before, after, energy, peak) else 0
-        if calm >= rule.calm_checks:
-            break
-        now = time.monotonic()
-        if spec.time_limit > 0.0 and now - started > spec.time_limit:
-            raise EngineError(f"time limit of {spec.time_limit:g} s reached; the packing was stopped", transient=True)
-        if now - reported > PROGRESS_SECONDS:
-            reported = now
-            request.progress(f"step {bed.step:,}, {bed.count:,} of {bed.total:,} spheres down")
-    return Trajectory(*np.array(records, dtype=np.float64).T)
+class _Run:
+    """One bed on its way to rest: what the stop rule saw, reports, pictures and the saved state."""
+
+    def __init__(self, request: SettleRequest, bed: Bed):
+        self.request, self.bed = request, bed
+        self.records = [bed.record()]
+        self.started = self.reported = self.saved = time.monotonic()
+        self.before = 0.0  # wall time spent before the bed was resumed, s
+        self.work = 0  # spheres in the bed times steps, in this run
+
+    def settle(self) -> None:
+        """Advance from check to check until the stop rule holds or its patience ends.
+
+        Raises
+        ------
+        EngineError
+            If the bed explodes, or at the time limit (transient: the saved state lets it go on).
+        """
+        rule, spec = self.request.rule, self.request.spec
+        while len(self.records) <= rule.max_checks and rule.settled_at(self.trajectory()) is None:
+            self._picture()
+            self.bed.advance(rule.check_steps)
+            self.work += self.bed.count * rule.check_steps
+            self.records.append(self.bed.record())
+            if not all(map(math.isfinite, self.records[-1])):
+                raise EngineError("the bed exploded: positions are no longer finite; use a shorter time step")
+            now = time.monotonic()
+            if 0.0 < spec.time_limit < now - self.started:
+                self._save()
+                limit = f"time limit of {spec.time_limit:g} s reached; the packing was stopped"
+                raise EngineError(limit, transient=True)
+            if now - self.saved > STATE_SECONDS:
+                self._save()
+            if now - self.reported > PROGRESS_SECONDS:
+                self.reported = now
+                self.request.progress(self._report())
+
+    def trajectory(self) -> Trajectory:
+        """Return what the stop rule saw so far."""
+        return Trajectory(*np.array(self.records, dtype=np.float64).T)
+
+    def spent(self) -> float:
+        """Wall time of the packing, s, with what was spent before it was resumed."""
+        return self.before + time.monotonic() - self.started
+
+    def resume(self) -> None:
+        """Go on from a saved state if there is one; one that cannot be read is not there."""
+        path = self.request.state_file
+        if path is None or not path.exists():
+            return
+        try:
+            with np.load(path) as data:
+                records, before = data["records"], float(data["spent"])
+                self.bed.restore({name: data[name] for name in data.files})
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+            self.bed = Bed.from_cloud(self.request.cloud, self.request.spec, self.bed.threads)
+            return
+        self.records = [tuple(row) for row in records]
+        self.before = before
+        self.request.progress(f"resumed at step {self.bed.step:,}")
+
+    def _save(self) -> None:
+        path = self.request.state_file
+        if path is None:
+            return
+        with publish(path) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, records=np.array(self.records), spent=self.spent(), **self.bed.saved())
+        self.saved = time.monotonic()
+
+    def _picture(self) -> None:
+        check = len(self.records) - 1
+        if self.request.spec.write_vtk and check % CHECKS_PER_PICTURE == 0:
+            path: Path = self.request.folder / f"packing_{self.bed.step}.vtk"
+            write_vtk(path, *self.bed.state(), self.request.cloud.radius)
+
+    def _report(self) -> str:
+        bed = self.bed
+        left = self._seconds_left()
+        when = f"about {left / 60.0:.0f} min left" if left > 90.0 else f"about {left:.0f} s left"
+        return f"step {bed.step:,}, {bed.down:,} of {bed.total:,} spheres down, {when}"
+
+    def _seconds_left(self) -> float:
+        """Forecast from the pace so far and the spheres' free fall on a bed that rises with them."""
+        bed, cloud = self.bed, self.request.cloud
+        depth = (1.0 - cloud.void_fraction) * cloud.height / TYPICAL_SOLIDS
+        arrival = self.request.spec.free_fall_time(max(cloud.height - depth, 0.0)) / self.request.spec.time_step
+        steps = np.linspace(bed.step, max(REST_AFTER_ARRIVAL * arrival, 1.02 * bed.step), 101)
+        down: FloatArray = np.minimum(
+            1.0, np.array([bed.fallen(int(step)) for step in steps]) / bed.fallen(int(arrival))
+        )
+        pace = (time.monotonic() - self.started) / max(self.work, 1)
+        return float(pace * bed.total * down.mean() * (steps[-1] - steps[0]))

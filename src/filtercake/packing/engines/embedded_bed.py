@@ -7,6 +7,8 @@ with its pairs and forces, when something that has left the parabola comes near 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -17,16 +19,33 @@ from filtercake.packing.engines import embedded_kernels as kernels
 from filtercake.packing.spec import PackingSpec
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
-SKIN_DIAMETERS = (0.08, 0.6)
+SKIN_DIAMETERS = (0.08, 1.0)
 """Narrowest and widest neighbour skin, over the smallest diameter."""
 LISTING_STEPS = 80
 """Time steps that a list of pairs should last: the skin follows from it and from the fastest sphere."""
-HORIZON_STEPS = 128
+HORIZON_STEPS = 256
 """Most time steps between two listings while spheres are airborne."""
 MARGIN_DIAMETERS = 0.05
 """Height over the bed up to which falling spheres are in the pair list, over the largest diameter."""
 CEILING_BOXES = 5.0
 """Height over the box side, or over the cloud's, at which a bed counts as exploded."""
+
+
+SIZED_ARRAYS = ("watched", "grounded")
+"""Arrays whose size changes."""
+STATE_ARRAYS = (
+    "spheres",
+    "floor",
+    "identity",
+    "level",
+    "touched",
+    "spin",
+    "floor_spring",
+    "reference",
+    "bounds",
+    *SIZED_ARRAYS,
+)
+STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "horizon", "skin", "frame_step")
 
 
 def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
@@ -124,6 +143,35 @@ class Bed:
         self.floor = np.column_stack(
             [4.0 / 3.0 * self.modulus * root, damping * np.sqrt(2.0 * self.modulus * root * self.mass)]
         )
+
+    def saved(self) -> dict[str, Any]:
+        """Everything that decides how the bed goes on, to the last bit."""
+        arrays = {name: getattr(self, name) for name in STATE_ARRAYS}
+        pairs = {f"pairs_{name}": value for name, value in self.pairs._asdict().items()}
+        totals = np.stack([self.force[0], self.torque[0] if self.frictional else np.zeros_like(self.force[0])])
+        numbers = np.array([getattr(self, name) for name in STATE_NUMBERS], dtype=np.float64)
+        return {**arrays, **pairs, "totals": totals, "numbers": numbers}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from what :meth:`saved` returned for a bed of the same cloud, spec and number of threads.
+
+        Raises
+        ------
+        KeyError, ValueError
+            If it is not such a state.
+        """
+        for name in STATE_ARRAYS:
+            own = getattr(self, name)
+            if name in SIZED_ARRAYS:
+                setattr(self, name, np.array(saved[name], dtype=own.dtype))
+            else:
+                own[...] = saved[name]
+        self.pairs = kernels.Pairs(*(np.array(saved[f"pairs_{name}"]) for name in kernels.Pairs._fields))
+        self.force[0] = saved["totals"][0]
+        if self.frictional:
+            self.torque[0] = saved["totals"][1]
+        for name, value in zip(STATE_NUMBERS, saved["numbers"], strict=True):
+            setattr(self, name, type(getattr(self, name))(value))
 
     @property
     def down(self) -> int:

@@ -197,9 +197,12 @@ def command(process_count: int) -> list[str]:
 
 
 def write_cloud(cloud: Cloud, density: float, path: Path) -> None:
-    """Write a cloud as a LIGGGHTS data file in micro units, in a box just high enough for it."""
+    """Write a cloud as a LIGGGHTS data file in micro units, in a box twice as high.
+
+    Small spheres are thrown up when large ones land; what leaves the box is lost.
+    """
     margin = float(cloud.radius.max())
-    lo, hi = micro.number(-margin / micro.LENGTH), micro.number((cloud.height + margin) / micro.LENGTH)
+    lo, hi = micro.number(-margin / micro.LENGTH), micro.number((2.0 * cloud.height + margin) / micro.LENGTH)
     side = micro.number(cloud.length / micro.LENGTH)
     header = (
         f"initial cloud, units micro\n\n{cloud.radius.size} atoms\n1 atom types\n\n"

@@ -1,0 +1,20 @@
+"""Rule compare_engines: mean porosities of two engines, case by case."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.agreement import compare_engines
+from filtercake.job import job
+from filtercake.packing.result import publish
+
+COLUMNS = ["study", "csd", "cohesion_kJ_m3", "friction", "engine", "replicate", "seed", "status", "reason"]
+COLUMNS += ["porosity", "porosity_as_published", "overlap_max", "coordination", "steps"]
+
+with job(snakemake.log[0]) as log:
+    replicates = pd.concat([pd.read_csv(path) for path in snakemake.input.replicates], ignore_index=True)
+    table = compare_engines(replicates, *snakemake.params.engines)
+    log.info("\n%s", table.to_string())
+    for output, made in ((snakemake.output.replicates, replicates[COLUMNS]), (snakemake.output.table, table)):
+        with publish(Path(output)) as temporary:
+            made.to_csv(temporary, index=False)
