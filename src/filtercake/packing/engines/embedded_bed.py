@@ -21,10 +21,14 @@ from filtercake.units import GRAVITY, FloatArray, IntArray
 
 SKIN_DIAMETERS = (0.08, 1.0)
 """Narrowest and widest neighbour skin, over the smallest diameter."""
-LISTING_STEPS = 80
+LISTING_STEPS = 100
 """Time steps that a list of pairs should last: the skin follows from it and from the fastest sphere."""
-HORIZON_STEPS = 256
-"""Most time steps between two listings while spheres are airborne."""
+APPROACH_SKINS = 2.0
+"""Skins by which a sphere and an airborne one surely do not approach each other between two listings.
+
+The frame sinks by less than half a skin, a sphere in the bed rises by less than half a skin in it, and an airborne
+one falls by less than one (twice the frame's speed).
+"""
 MARGIN_DIAMETERS = 0.05
 """Height over the bed up to which falling spheres are in the pair list, over the largest diameter."""
 CEILING_BOXES = 5.0
@@ -45,7 +49,7 @@ STATE_ARRAYS = (
     "bounds",
     *SIZED_ARRAYS,
 )
-STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "horizon", "skin", "frame_step")
+STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step")
 
 
 def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
@@ -109,7 +113,6 @@ class Bed:
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
         self.listed_at = 0  # step of the last listing
-        self.horizon = 0  # step at which airborne spheres are looked at again
         self.kernel = kernels.make_advance(spec.cohesion > 0.0, self.frictional, threads > 1)
         self.find_pairs = kernels.make_find_pairs(threads > 1)
 
@@ -191,16 +194,12 @@ class Bed:
         """Advance by ``steps`` time steps; afterwards the forces at the positions are known."""
         end = self.step + steps
         while self.step < end or (self.count and not self.ready):
-            airborne = self.count < self.total
-            if self.listed and airborne and self.step >= self.horizon:
-                self.listed = False
             if not self.listed:
                 self._prepare()
                 if self.count == 0:
                     self.step = min(end, self._first_wake(end))
                     continue
-            until = min(end, self.horizon) if self.count < self.total else end
-            self.step += self._run(until - self.step)
+            self.step += self._run(end - self.step)
 
     def _run(self, steps: int) -> int:
         n = self.count
@@ -232,11 +231,11 @@ class Bed:
 
     def _prepare(self) -> None:
         """Wake the airborne spheres that the bed may reach, and list the pairs."""
-        self._mark_touched()
-        falling = self.count < self.total or not self.touched.all()
+        falling = not self.touched.all()
         # half way between what falls and what lies: neither moves more than half as much in this frame
         self.frame_step = -0.5 * self.falling_speed(self.step) * self.spec.time_step if falling else 0.0
         self.skin = self._choose_skin()
+        self._mark_touched()
         while self._wake():  # what was woken may be about to meet the floor itself
             self._mark_touched()
         if self.count:
@@ -249,9 +248,8 @@ class Bed:
         A sphere that another has touched moves sideways; until then its sideways velocity is nothing to the last bit.
         """
         n = self.count
-        ahead = self.fallen(self.step + HORIZON_STEPS) - self.fallen(self.step)
         self.touched[:n] |= (self.velocity[:n, 0] != 0.0) | (self.velocity[:n, 1] != 0.0)
-        self.touched[:n] |= self.position[:n, 2] - self.radius[:n] < ahead
+        self.touched[:n] |= self.position[:n, 2] - self.radius[:n] < self.skin
 
     def _choose_skin(self) -> float:
         """Skin, m, that lasts ``LISTING_STEPS`` at the present speeds, within bounds set by the smallest size."""
@@ -266,8 +264,9 @@ class Bed:
         return min(max(wanted, low * self.smallest), high * self.smallest)
 
     def _line(self, step: int, top: float) -> float:
-        """Height at release below which spheres join a bed of height ``top`` (m) at a step, to last a horizon."""
-        return top + self.skin + MARGIN_DIAMETERS * 2.0 * float(self.largest[0]) + self.fallen(step + HORIZON_STEPS)
+        """Height at release, m, below which spheres join a bed of height ``top`` (m) at a step."""
+        margin = APPROACH_SKINS * self.skin + MARGIN_DIAMETERS * 2.0 * float(self.largest[0])
+        return top + margin + self.fallen(step)
 
     def _wake(self) -> bool:
         """Move the airborne spheres that the touched ones may reach soon into the bed; say whether there were any."""
@@ -304,12 +303,10 @@ class Bed:
         n = self.count
         # the frame and a sphere in it move by half a skin each before the next listing
         self.grounded = np.flatnonzero(self.position[:n, 2] - self.radius[:n] < self.skin)
-        self.horizon = self.step + HORIZON_STEPS
         if n == self.total:
             self.watched = np.empty(0, dtype=np.int64)
             return
-        until = self.fallen(self.horizon)
-        reach = self.position[:n, 2] + self.radius[:n] + self.skin + until
+        reach = self.position[:n, 2] + self.radius[:n] + APPROACH_SKINS * self.skin + self.fallen(self.step)
         self.watched = np.flatnonzero(reach > self.bottom[n])
 
     def _list_pairs(self) -> None:
