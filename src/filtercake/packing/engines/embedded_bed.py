@@ -19,9 +19,9 @@ from filtercake.packing.engines import embedded_kernels as kernels
 from filtercake.packing.spec import PackingSpec
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
-SKIN_DIAMETERS = (0.08, 1.0)
+SKIN_DIAMETERS = (0.08, 1.5)
 """Narrowest and widest neighbour skin, over the smallest diameter."""
-LISTING_STEPS = 100
+LISTING_STEPS = 250
 """Time steps that a list of pairs should last: the skin follows from it and from the fastest sphere."""
 APPROACH_SKINS = 2.0
 """Skins by which a sphere and an airborne one surely do not approach each other between two listings.
@@ -49,12 +49,13 @@ STATE_ARRAYS = (
     "bounds",
     *SIZED_ARRAYS,
 )
-STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step")
+STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step", "slack")
 
 
 def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
     """Make an empty pair list with room for ``capacity`` pairs."""
     return kernels.Pairs(
+        np.zeros(spheres, dtype=np.uint64),
         np.zeros(spheres, dtype=np.uint64),
         np.zeros(spheres, dtype=np.uint64),
         np.empty(capacity, dtype=np.uint32),
@@ -108,7 +109,7 @@ class Bed:
         self.watched = np.empty(0, dtype=np.int64)
         self.grounded = np.empty(0, dtype=np.int64)
         self.pairs = _no_pairs(0, 8 * n + 64 * threads, self.frictional)
-        self.skin, self.frame_step = 0.0, 0.0
+        self.skin, self.frame_step, self.slack = 0.0, 0.0, -1.0
         self.count = n
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
@@ -203,7 +204,7 @@ class Bed:
 
     def _run(self, steps: int) -> int:
         n = self.count
-        done, self.ready = self.kernel(
+        done, self.ready, self.slack = self.kernel(
             steps,
             self.ready,
             self.starting,
@@ -221,9 +222,10 @@ class Bed:
             self.law,
             self.length,
             self.spec.time_step,
-            0.5 * self.skin,
+            self.skin,
             self.frame_step * (self.step - self.listed_at),
             self.frame_step,
+            self.slack,
         )
         self.starting = self.starting and done == 0
         self.listed = self.ready
@@ -329,7 +331,7 @@ class Bed:
         self.pairs = pairs
         self._share_work()
         self.reference[:n] = self.position[:n]
-        self.listed, self.listed_at = True, self.step
+        self.listed, self.listed_at, self.slack = True, self.step, -1.0
 
     def _find_pairs(self, grid: kernels.Grid) -> kernels.Pairs:
         n, capacity = self.count, self.pairs.neighbour.size
@@ -343,7 +345,7 @@ class Bed:
                 self.bounds, spheres, level, grid, self.length, self.skin, first, last, pairs.neighbour
             )
             if count <= pairs.neighbour.size // self.threads:
-                return pairs._replace(first=first, last=last)
+                return pairs._replace(first=first, near=last.copy(), last=last)
             pairs = _no_pairs(0, int(1.3 * count) * self.threads, self.frictional)
 
     def _carry_springs(self, order: IntArray, pairs: kernels.Pairs) -> None:

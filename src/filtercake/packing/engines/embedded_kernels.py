@@ -31,12 +31,12 @@ class Grid(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Pairs by sphere: ``first[i]:last[i]`` are those of sphere i.
+    """Pairs by sphere: ``first[i]:last[i]`` are those of sphere i, near ones before ``near[i]``.
 
     Attributes
     ----------
-    first, last : ndarray, shape (n,)
-        Range of each sphere's pairs.
+    first, near, last : ndarray, shape (n,)
+        Range of each sphere's pairs; those from ``near`` on cannot touch for some steps to come.
     neighbour : ndarray, shape (m,)
         The other sphere, and in the upper bits a code of its periodic image.
     constants : ndarray, shape (m, 2)
@@ -46,6 +46,7 @@ class Pairs(NamedTuple):
     """
 
     first: Unsigned
+    near: Unsigned
     last: Unsigned
     neighbour: Neighbours
     constants: FloatArray
@@ -68,6 +69,8 @@ class Law(NamedTuple):
 # columns of the state: one sphere is one cache line
 X, Y, Z, RADIUS, U, V, W, MASS = range(8)
 
+NEAR_STEPS = 20
+"""Time steps that the choice of near pairs should last."""
 FUSED = {"contract"}
 """Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
 
@@ -165,6 +168,8 @@ def _find_pairs(
             y1 = min(math.floor((y + reach) * inverse), 2 * across - 1)
             z0 = min(max(math.floor((z - reach) / cell_size[k]), 0), layers - 1)
             z1 = min(max(math.floor((z + reach) / cell_size[k]), 0), layers - 1)
+            if k == own:  # what lies in lower layers comes earlier and has listed the pair
+                z0 = min(max(int(z / cell_size[k]), 0), layers - 1)
             for cz in range(z0, z1 + 1):
                 for cy in range(y0, y1 + 1):
                     wrap_y = -1 if cy < 0 else (1 if cy >= across else 0)
@@ -226,7 +231,7 @@ def make_find_pairs(threaded: bool) -> Callable[..., int]:
 @njit(cache=True)
 def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_ratio: float) -> None:
     """Fill each pair's constants."""
-    first, last, neighbour, constants, _ = pairs
+    first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
     damping = 2.0 * math.sqrt(5.0 / 6.0) * damping_ratio
     for i in range(first.size):
         for p in range(first[i], last[i]):
@@ -241,8 +246,8 @@ def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_rati
 @njit(cache=True)
 def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
     """Carry tangential springs over to a new pair list; ``order[i]`` is where sphere i stood before, -1 if new."""
-    old_first, old_last, old_neighbour, _, old_spring = old
-    first, last, neighbour, _, spring = new
+    old_first, old_last, old_neighbour, old_spring = old.first, old.last, old.neighbour, old.spring
+    first, last, neighbour, spring = new.first, new.last, new.neighbour, new.spring
     for i in range(first.size):
         old_i = order[i]
         for p in range(first[i], last[i]):
@@ -258,6 +263,43 @@ def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
                 if (old_neighbour[q] & INDEX_MASK) == old_i:
                     for k in range(3):
                         spring[p, k] = -old_spring[q, k]
+
+
+@njit(cache=True, error_model="numpy", fastmath=FUSED)
+def _put_near_first(begin: int, end: int, state: FloatArray, pairs: Pairs, length: float, reach: float) -> None:
+    """Order the pairs of spheres ``begin`` to ``end`` so that those with gaps under ``reach`` (m) come first."""
+    first, near, last, neighbour, constants, spring = pairs
+    frictional = spring.shape[0] == neighbour.size
+    for i in range(begin, end):
+        low, high = np.int64(first[i]), np.int64(last[i])
+        while low < high:
+            j = neighbour[low] & INDEX_MASK
+            code = np.int64(neighbour[low] >> IMAGE_SHIFT)
+            dx = state[i, X] - state[j, X] - (code % 3 - 1) * length
+            dy = state[i, Y] - state[j, Y] - (code // 3 - 1) * length
+            dz = state[i, Z] - state[j, Z]
+            touching = state[i, RADIUS] + state[j, RADIUS] + reach
+            if dx * dx + dy * dy + dz * dz < touching * touching:
+                low += 1
+                continue
+            high -= 1
+            neighbour[low], neighbour[high] = neighbour[high], neighbour[low]
+            for k in range(2):
+                constants[low, k], constants[high, k] = constants[high, k], constants[low, k]
+            if frictional:
+                for k in range(3):
+                    spring[low, k], spring[high, k] = spring[high, k], spring[low, k]
+        near[i] = low
+
+
+@njit(cache=True, error_model="numpy", fastmath=FUSED)
+def _fastest(state: FloatArray, frame_speed: float) -> float:
+    """Return the largest speed in a frame that rises with ``frame_speed``, m/s."""
+    fastest = 0.0
+    for i in range(state.shape[0]):
+        w = state[i, W] - frame_speed
+        fastest = max(fastest, state[i, U] * state[i, U] + state[i, V] * state[i, V] + w * w)
+    return math.sqrt(fastest)
 
 
 @njit(cache=True, error_model="numpy", fastmath=FUSED)
@@ -290,14 +332,15 @@ def _make_pair_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
         spring_step: float,
     ) -> None:
         """Add the forces and torques of the pairs of spheres ``begin`` to ``end``; ``force`` has shape (n, 3)."""
-        first, last, neighbour, constants, spring = pairs
+        first, near, neighbour = pairs.first, pairs.near, pairs.neighbour
+        constants, spring = pairs.constants, pairs.spring
         lens_factor = 0.25 * math.pi * law.cohesion
         for i in range(begin, end):
             xi, yi, zi, ri = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
             ui, vi, wi = state[i, U], state[i, V], state[i, W]
             fx, fy, fz = 0.0, 0.0, 0.0
             tx, ty, tz = 0.0, 0.0, 0.0
-            for p in range(first[i], last[i]):
+            for p in range(first[i], near[i]):
                 j = neighbour[p] & INDEX_MASK
                 code = neighbour[p] >> IMAGE_SHIFT
                 dx, dy, dz = xi - state[j, X], yi - state[j, Y], zi - state[j, Z]
@@ -428,7 +471,7 @@ def _make_floor_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
 
 
 @cache
-def _make_move(frictional: bool) -> Callable[..., float]:
+def _make_move(frictional: bool) -> Callable[..., tuple[float, float]]:
     """Compile one step of the equations of motion."""
 
     @njit(cache=True, error_model="numpy", fastmath=FUSED)
@@ -443,9 +486,13 @@ def _make_move(frictional: bool) -> Callable[..., float]:
         kick: float,
         time_step: float,
         frame: float,
-    ) -> float:
-        """Kick and move spheres ``begin`` to ``end``; return the largest squared distance from their reference."""
-        farthest = 0.0
+        frame_speed: float,
+    ) -> tuple[float, float]:
+        """Kick and move spheres ``begin`` to ``end``.
+
+        Returns the largest squared distance from their reference and the largest squared speed, in the frame.
+        """
+        farthest, fastest = 0.0, 0.0
         for i in range(begin, end):
             scale = kick / state[i, MASS]
             u = state[i, U] + scale * force[i, 0]
@@ -464,9 +511,11 @@ def _make_move(frictional: bool) -> Callable[..., float]:
                     spin[i, k] += turn * torque[i, k]
             if not away <= farthest:  # keeps what is not a number, too
                 farthest = away
-        return farthest
+            rising = w - frame_speed
+            fastest = max(fastest, u * u + v * v + rising * rising)
+        return farthest, fastest
 
-    compiled: Callable[..., float] = move
+    compiled: Callable[..., tuple[float, float]] = move
     return compiled
 
 
@@ -480,7 +529,7 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 
 
 @cache
-def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
+def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool, float]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
     A threaded loop gives each thread a share of the pairs and a force buffer of its own.
@@ -508,26 +557,41 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
         law: Law,
         length: float,
         time_step: float,
-        drift_limit: float,
+        skin: float,
         frame: float,
         frame_step: float,
-    ) -> tuple[int, bool]:
-        """Advance up to ``steps``; return the steps done and whether the forces at the new positions are known.
+        slack: float,
+    ) -> tuple[int, bool, float]:
+        """Advance up to ``steps``.
 
-        It stops early, forces unknown, when a sphere has moved by ``drift_limit`` since the pairs were listed, or
-        when one of the ``watched`` spheres, which have neighbours that are not in the list, has been touched.
-        Movement is seen from a frame that has risen by ``frame`` and rises by ``frame_step`` per step: only
-        relative movement opens or closes a pair. ``force`` and ``torque`` have one layer per thread, shape
-        (threads, n, 3); the first ends as the total. ``bounds`` (threads + 1,) are the spheres whose pairs each
-        thread works on, ``grounded`` the spheres that may touch the floor.
+        It stops early, forces unknown, when a sphere has moved by half a skin since the pairs were listed, or when
+        one of the ``watched`` spheres, which have neighbours that are not in the list, has been touched. Movement
+        is seen from a frame that has risen by ``frame`` and rises by ``frame_step`` per step: only relative
+        movement opens or closes a pair. ``slack`` is the distance by which spheres may yet approach each other
+        before pairs that are not near may touch; below 0 they are told apart anew.
+
+        ``force`` and ``torque`` have one layer per thread, shape (threads, n, 3); the first ends as the total.
+        ``bounds`` (threads + 1,) are the spheres whose pairs each thread works on, ``grounded`` the spheres that
+        may touch the floor.
+
+        Returns
+        -------
+        Steps done, whether the forces at the new positions are known, and the slack that is left.
         """
         n = state.shape[0]
         parts = bounds.size - 1
         done = 0
-        limit = drift_limit * drift_limit
-        drift = np.zeros(parts)
+        limit = 0.25 * skin * skin
+        drift, speed = np.zeros(parts), np.zeros(parts)
+        frame_speed = frame_step / time_step
         while True:
             if not ready:
+                if slack < 0.0:
+                    slack = min(2.0 * _fastest(state, frame_speed) * time_step * NEAR_STEPS, skin)
+                    for t in prange(parts):
+                        _put_near_first(bounds[t], bounds[t + 1], state, pairs, length, slack)
+                    if slack == skin:
+                        slack = np.inf  # every pair is near
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
                     for i in range(n):
@@ -549,12 +613,12 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                 floor_forces(grounded, state, spin, force[0], torque[0], floor, floor_spring, law, spring_step)
                 ready = True
             if done == steps:
-                return done, ready
+                return done, ready, slack
             kick = 0.5 * time_step if starting else time_step
             starting = False
             frame += frame_step
             for t in prange(parts):
-                drift[t] = move(
+                drift[t], speed[t] = move(
                     t * n // parts,
                     (t + 1) * n // parts,
                     state,
@@ -565,11 +629,13 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                     kick,
                     time_step,
                     frame,
+                    frame_speed,
                 )
+            slack -= 2.0 * math.sqrt(speed.max()) * time_step
             done += 1
             ready = False
             if not max(drift.max(), frame * frame) < limit or _disturbed(state, watched):
-                return done, ready
+                return done, ready, slack
 
-    compiled: Callable[..., tuple[int, bool]] = advance
+    compiled: Callable[..., tuple[int, bool, float]] = advance
     return compiled
