@@ -161,3 +161,14 @@ def test_stopped_falling_turns_height_into_porosity() -> None:
 
 def test_a_bed_still_falling_at_a_constant_rate_has_not_stopped() -> None:
     assert not stopped_falling(trajectory(np.linspace(10, 3, 100).tolist(), [0.0] * 100), 1e-3)
+
+
+def test_a_bed_that_swings_without_falling_is_at_rest() -> None:
+    swing = [3.0 * (1.0 + 0.004 * math.sin(2 * math.pi * k / 4.4)) for k in range(60)]
+    energy = [1.0, 1.0] + [1e-4] * 58
+    assert max(abs(np.diff(swing))) / 3.0 > 5 * RULE.height_tolerance  # from check to check it does not look calm
+    settled = RULE.settled_at(trajectory(swing, energy))
+    assert settled is not None
+    assert settled < 20
+    falling = [height * 0.997**k for k, height in enumerate(swing)]
+    assert RULE.settled_at(trajectory(falling, energy)) is None

@@ -14,6 +14,8 @@ CHECKS_PER_FALL = 40
 """Checks of the stop rule during one free-fall time of the highest sphere."""
 CALM_CHECKS = 2
 """Checks on end that must find the bed at rest."""
+WINDOW = 4
+"""Checks whose mean height is compared with that of as many before them: a deep bed swings on its soft contacts."""
 ENERGY_FRACTION = 1e-3
 """The kinetic energy must have fallen below this share of its peak."""
 TYPICAL_SOLIDS = 0.65
@@ -47,7 +49,8 @@ class StopRule:
     """The bed is at rest when its mean height and its kinetic energy have both stopped falling.
 
     The mean height z of a bed of solids fraction 1-eps obeys d eps = (1-eps) dz/z, so that a tolerance on
-    porosity is one on height, which is free of the counting noise of a sample region.
+    porosity is one on height, which is free of the counting noise of a sample region. A deep bed goes on swinging
+    when it has long stopped falling: it counts as calm, too, when the mean over a window of checks no longer falls.
 
     Attributes
     ----------
@@ -80,10 +83,23 @@ class StopRule:
             height_tolerance=spec.porosity_tolerance / TYPICAL_SOLIDS,
         )
 
-    def is_calm(self, before: float, after: float, energy: float, peak_energy: float) -> bool:
-        """Whether one check finds the bed at rest; ``before`` and ``after`` are mean heights."""
-        fallen = abs(before - after) / after
-        return fallen < self.height_tolerance and energy < self.energy_fraction * peak_energy
+    def is_calm(self, heights: FloatArray, energy: float, peak_energy: float) -> bool:
+        """Whether one check finds the bed at rest.
+
+        Parameters
+        ----------
+        heights : ndarray, shape (m,)
+            Mean heights up to this check, m; before the first the bed stood at the first.
+        energy, peak_energy : float
+            Kinetic energy now and at its largest, J.
+        """
+        if not energy < self.energy_fraction * peak_energy:
+            return False
+        last = np.concatenate([np.full(max(0, 2 * WINDOW - heights.size), heights[0]), heights[-2 * WINDOW :]])
+        fallen = abs(last[-2] - last[-1]) / last[-1]
+        older, newer = last[:WINDOW].mean(), last[WINDOW:].mean()
+        swung = abs(older - newer) / newer / WINDOW
+        return bool(min(fallen, swung) < self.height_tolerance)
 
     def settled_at(self, trajectory: Trajectory) -> int | None:
         """Index of the check at which the rule held, or None.
@@ -95,8 +111,7 @@ class StopRule:
         for k in range(1, trajectory.time.size):
             energy = float(trajectory.kinetic_energy[k])
             peak = max(peak, energy)
-            before, after = float(trajectory.mean_height[k - 1]), float(trajectory.mean_height[k])
-            calm = calm + 1 if self.is_calm(before, after, energy, peak) else 0
+            calm = calm + 1 if self.is_calm(trajectory.mean_height[: k + 1], energy, peak) else 0
             if calm >= self.calm_checks:
                 return k
         return None

@@ -7,6 +7,7 @@ import time
 import zipfile
 from pathlib import Path
 
+import numba
 import numpy as np
 from numba import get_num_threads, set_num_threads
 
@@ -18,6 +19,9 @@ from filtercake.packing.pictures import write_vtk
 from filtercake.packing.result import SettledState, publish
 from filtercake.packing.settling import TYPICAL_SOLIDS, Trajectory
 from filtercake.units import FloatArray
+
+# of the thread pools, the one with the least cost per parallel part of a time step comes first
+numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
 
 PROGRESS_SECONDS = 20.0
 STATE_SECONDS = 60.0

@@ -218,7 +218,7 @@ def make_find_pairs(threaded: bool) -> Callable[..., int]:
         of part t, ``bounds[t]:bounds[t + 1]``, have the t-th share of the list to themselves. Returns the largest
         number of pairs in one part: when it is more than a share holds, the list holds only a part of them.
         """
-        parts = bounds.size - 1
+        parts = bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
         counts = np.zeros(parts, dtype=np.int64)
         for t in prange(parts):
             counts[t] = _find_pairs(t, bounds, state, level, grid, length, skin, first, last, neighbour)
@@ -579,7 +579,7 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
         Steps done, whether the forces at the new positions are known, and the slack that is left.
         """
         n = state.shape[0]
-        parts = bounds.size - 1
+        parts = bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
         done = 0
         limit = 0.25 * skin * skin
         drift, speed = np.zeros(parts), np.zeros(parts)

@@ -18,6 +18,7 @@ from filtercake.packing.engines import micro, process
 from filtercake.packing.engines.base import SettleRequest, parallelism
 from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
 from filtercake.packing.result import SettledState
+from filtercake.packing.settling import WINDOW
 from filtercake.packing.spec import PackingSpec
 from filtercake.units import GRAVITY, FloatArray
 
@@ -83,6 +84,7 @@ class Liggghts:
             "check_steps": rule.check_steps,
             "max_checks": rule.max_checks,
             "calm_checks": rule.calm_checks,
+            "window": WINDOW,
             "height_tolerance": micro.number(rule.height_tolerance),
             "energy_fraction": micro.number(rule.energy_fraction),
             "write_vtk": spec.write_vtk,
