@@ -1,27 +1,35 @@
-"""Rule time_against_published: the tuned engines and the paper's protocol in turn, on one core."""
+"""Rule time_in_turn: one case by several protocols in turn, on one core."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from filtercake import engine_choice
-from filtercake.benchmark import as_published, compare, time_in_turn
+from filtercake.benchmark import compare, contender, time_in_turn
 from filtercake.config_loading import load_study
 from filtercake.job import Progress, job
 from filtercake.packing.result import publish
 from filtercake.study import base_point
+from filtercake.units import MICROMETRE, MICROSECOND
 
 with job(snakemake.log[0]) as log:
-    study = load_study(Path(snakemake.params.study))
-    spec = base_point(study, snakemake.params.csd, engine_choice.choose).spec
-    baseline = as_published(spec)
+    case = snakemake.params.case
+    study = load_study(Path(case["study"]))
+    spec = base_point(study, case["csd"], engine_choice.choose).spec
+    spec = replace(spec, particles=case.get("particles", spec.particles), processes=case["processes"])
+    published = {
+        "time_step": case.get("time_step_us", 0.0) * MICROSECOND,
+        "skin": case.get("skin_um", 0.0) * MICROMETRE,
+        "steps": case.get("steps", 0),
+    }
     timings = time_in_turn(
-        [baseline, spec],
-        study.csds[snakemake.params.csd].truncated,
-        snakemake.params.replicates,
+        [contender(name, spec, **published) for name in case["engines"]],
+        study.csds[case["csd"]].truncated,
+        case["replicates"],
         lambda line: (log.info(line), Progress().note(line)),
     )
     for output, table in (
         (snakemake.output.timings, timings),
-        (snakemake.output.comparison, compare(timings, baseline.engine)),
+        (snakemake.output.comparison, compare(timings)),
     ):
         with publish(Path(output)) as temporary:
             table.to_csv(temporary, index=False)

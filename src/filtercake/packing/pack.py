@@ -11,9 +11,9 @@ from typing import Any
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
-from filtercake.packing.cloud import make_cloud
+from filtercake.packing.cloud import Cloud, make_cloud
 from filtercake.packing.engines import Engine, SettleRequest, get_engine
-from filtercake.packing.result import Packing, read_record, sha256, write_json
+from filtercake.packing.result import Packing, SettledState, read_record, sha256, write_json
 from filtercake.packing.settling import StopRule
 from filtercake.packing.spec import PackingSpec, digest, stage_seed
 
@@ -96,21 +96,62 @@ def pack(
     CloudError, EngineError, PackingRejected
         If the spheres cannot be placed, the engine fails, or its result is not acceptable.
     """
-    seed = cloud_seed(spec, csd, replicate)
-    cloud = make_cloud(csd, spec.particles, spec.void_fraction, seed)
-    rule = StopRule.for_bed(spec, cloud.length)
-    engine_seed = stage_seed(seed, "engine")
-    request = SettleRequest(spec, csd, cloud, rule, engine_seed, folder, progress, state_file)
-    state = (engine or get_engine(spec.engine)).settle(request)
-    measured = accept(state, spec, cloud, rule)
+    settled = settle(spec, csd, replicate, folder, engine=engine, progress=progress, state_file=state_file)
+    state = settled.state
     diagnostics = {
-        **measured,
+        **accept(state, spec, settled.cloud, settled.rule),
         "replicate": replicate,
-        "seed": seed,
+        "seed": settled.seed,
         "rayleigh_fraction": spec.rayleigh_fraction(csd.smallest),
         "spec": spec.as_dict(),
     }
     return Packing(state.position, state.radius, state.length, diagnostics)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What an engine made of a cloud, accepted or not.
+
+    Attributes
+    ----------
+    state : SettledState
+        The engine's result.
+    cloud : Cloud
+        What it started from.
+    rule : StopRule
+        When the bed was to stop.
+    seed : int
+        Seed of the cloud.
+    """
+
+    state: SettledState
+    cloud: Cloud
+    rule: StopRule
+    seed: int
+
+
+def settle(
+    spec: PackingSpec,
+    csd: CrystalSizeDistribution,
+    replicate: int,
+    folder: Path,
+    *,
+    engine: Engine | None = None,
+    progress: Report = lambda _: None,
+    state_file: Path | None = None,
+) -> Settled:
+    """Make a cloud and let an engine settle it; the parameters are those of :func:`pack`.
+
+    Raises
+    ------
+    CloudError, EngineError
+        If the spheres cannot be placed, or the engine fails.
+    """
+    seed = cloud_seed(spec, csd, replicate)
+    cloud = make_cloud(csd, spec.particles, spec.void_fraction, seed)
+    rule = StopRule.for_bed(spec, cloud.length)
+    request = SettleRequest(spec, csd, cloud, rule, stage_seed(seed, "engine"), folder, progress, state_file)
+    return Settled((engine or get_engine(spec.engine)).settle(request), cloud, rule, seed)
 
 
 def pack_replicates(

@@ -22,12 +22,17 @@ class LiggghtsAsPublished(Liggghts):
     name = "liggghts_as_published"
     template = "as_published.in.j2"
 
+    def __init__(self, steps: int = STEPS):
+        """Create the engine; ``steps`` is the fixed number of time steps."""
+        super().__init__()
+        self.steps = steps
+
     def settle(self, request: SettleRequest) -> SettledState:
         """Run the paper's protocol (see :class:`filtercake.packing.engines.base.Engine`)."""
-        return self._run(request, _published_values(request), expected=None)
+        return self._run(request, _published_values(request, self.steps), expected=None)
 
 
-def _published_values(request: SettleRequest) -> dict[str, Any]:
+def _published_values(request: SettleRequest, steps: int) -> dict[str, Any]:
     csd, spec = request.csd, request.spec
     seeds = prime_seeds(request.seed, csd.size.size + 2)
     classes = [
@@ -41,13 +46,13 @@ def _published_values(request: SettleRequest) -> dict[str, Any]:
     return {
         **_material_values(spec),
         "length": micro.number(request.cloud.length / micro.LENGTH),
-        "skin": micro.number(csd.largest / micro.LENGTH),
+        "skin": micro.number((spec.skin or csd.largest) / micro.LENGTH),
         "classes": classes,
         "distribution_seed": seeds[0],
         "insertion_seed": seeds[1],
         "particles": spec.particles,
         "rounds": ROUNDS,
-        "round_steps": STEPS // ROUNDS,
+        "round_steps": steps // ROUNDS,
         "write_vtk": False,
     }
 
