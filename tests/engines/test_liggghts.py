@@ -23,7 +23,7 @@ from filtercake.csd import CrystalSizeDistribution, mixture
 from filtercake.errors import EngineError, EngineMissing, PackingRejected
 from filtercake.packing import pack as pack_module
 from filtercake.packing.cloud import Cloud, make_cloud
-from filtercake.packing.engines import get_engine, liggghts_as_published, process
+from filtercake.packing.engines import get_engine, process
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.liggghts import Liggghts, find_executable, render, template_folder, write_cloud
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished, prime_seeds
@@ -228,14 +228,14 @@ def test_pictures_are_kept_when_asked_for(
 
 @pytest.mark.liggghts
 def test_the_published_protocol_runs_and_is_accepted(
-    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     # a fifth of its steps is 13 ms of physical time, twice the fall of this small bed
-    monkeypatch.setattr(liggghts_as_published, "STEPS", 30_000)
-    made = pack(dataclasses.replace(spec, engine="liggghts_as_published"), small_csd, 0, tmp_path)
+    scene = dataclasses.replace(spec, engine="liggghts_as_published")
+    made = pack(scene, small_csd, 0, tmp_path, engine=LiggghtsAsPublished(steps=30_000))
     assert made.diagnostics["engine"] == "liggghts_as_published"
     assert made.diagnostics["steps"] == 30_001  # one step inserts
-    # it draws its own spheres, and LIGGGHTS inserts fewer than asked (physics.md, trap 4): 77 of 100 here
+    # it draws its own spheres, and LIGGGHTS inserts fewer than asked: 77 of 100 here
     assert 50 <= made.diagnostics["particles"] <= 110
     assert 0.3 < measure(made, spec).interior < 0.5
 

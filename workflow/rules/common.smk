@@ -140,4 +140,5 @@ def begin_run():
     for name in points_of_run():
         for warning in KNOWN[name].warnings:
             print(f"warning: {warning}", file=sys.stderr)
-    print(console.plan(points_of_run(), to_make), file=sys.stderr)
+    if points_of_run():
+        print(console.plan(points_of_run(), to_make), file=sys.stderr)
