@@ -8,7 +8,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run test test-all lint format schemas figures regression speed agreement resume retry lock setup clean help
+.PHONY: run test test-all lint format schemas figures regression speed growth agreement resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -48,6 +48,9 @@ regression: setup ## the paper's protocol against its authors' own numbers (abou
 
 speed: setup ## both engines against the paper's protocol, in turn (about 60 min; leave the machine alone)
 	$(SNAKEMAKE) speed
+
+growth: setup ## the embedded engine's time per sphere and step against N and size ratio (about 20 min; leave the machine alone)
+	$(SNAKEMAKE) growth
 
 agreement: setup ## both engines on the same clouds, nine cases (about 45 min on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) agreement

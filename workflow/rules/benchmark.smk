@@ -109,3 +109,45 @@ rule time_in_turn:
         "timing {wildcards.case}"
     script:
         "../scripts/speed.py"
+
+
+rule growth:
+    input:
+        expand("{results}/benchmark/growth.csv", results=RESULTS),
+    localrule: True
+
+
+rule time_growth:
+    input:
+        library=library("growth"),
+        figure=library("figures.growth"),
+    output:
+        table="{results}/benchmark/growth.csv",
+        png="{results}/benchmark/growth.png",
+        pdf="{results}/benchmark/growth.pdf",
+    log:
+        "{results}/benchmark/logs/growth.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/growth.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    # alone on the machine: nothing else may run while it times
+    threads: workflow.cores
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        study=str(ROOT / "config" / "studies" / "pmma.yaml"),
+        csd="pmma_50_50",
+        cases=[
+            {"series": "particles", "particles": particles, "size_ratio": 4.0}
+            for particles in (1000, 3000, 10_000, 30_000, 100_000, 200_000)
+        ]
+        + [
+            {"series": "size_ratio", "particles": 40_000, "size_ratio": ratio}
+            for ratio in (1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
+        ],
+    message:
+        "timing the embedded engine's growth"
+    script:
+        "../scripts/growth.py"
