@@ -8,7 +8,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run test test-all lint format schemas figures regression speed growth agreement resume retry lock setup clean help
+.PHONY: run test test-all lint format schemas figures regression speed growth agreement references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -46,7 +46,7 @@ figures: setup ## redraw the figures
 regression: setup ## the paper's protocol against its authors' own numbers (about 15 min on 2 cores)
 	$(SNAKEMAKE) --config studies=config/benchmarks/as_published.yaml
 
-speed: setup ## both engines against the paper's protocol, in turn (about 60 min; leave the machine alone)
+speed: setup ## both engines against the paper's protocol, in turn (about 30 min; leave the machine alone)
 	$(SNAKEMAKE) speed
 
 growth: setup ## the embedded engine's time per sphere and step against N and size ratio (about 20 min; leave the machine alone)
@@ -54,6 +54,10 @@ growth: setup ## the embedded engine's time per sphere and step against N and si
 
 agreement: setup ## both engines on the same clouds, nine cases (about 45 min on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) agreement
+
+references: setup ## remake the stored LIGGGHTS trajectories that the tests compare the embedded engine with
+	$(BIN)/python tests/data/force_scenes.py
+	$(BIN)/python tests/data/make_liggghts_data.py
 
 resume: setup ## go on after a kill or a crash; finished packings are kept
 	$(BIN)/snakemake --unlock $(CONFIG) >/dev/null 2>&1 || true

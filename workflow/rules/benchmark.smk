@@ -51,7 +51,7 @@ SPEED = {
         "study": str(ROOT / "config" / "studies" / "pmma.yaml"),
         "csd": "pmma_50_50",
         "engines": ["liggghts_as_published", "liggghts", "embedded"],
-        "replicates": 5,
+        "replicates": 3,
         "processes": 1,
         "time_step_us": 0.1,
         "steps": 150_000,
