@@ -100,7 +100,7 @@ def time_in_turn(
 def warm_up(each: Contender, csd: CrystalSizeDistribution) -> None:
     """Let the embedded engine compile what the contender needs: once per machine, and not what is timed."""
     if isinstance(each.engine, Embedded):
-        few = replace(each.spec, particles=min(WARM_UP_PARTICLES, each.spec.particles))
+        few = replace(each.spec, particles=min(WARM_UP_PARTICLES, each.spec.particles), void_fraction=0.8)
         narrow = CrystalSizeDistribution.from_classes([csd.smallest], [1.0])
         with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
             settle(few, narrow, 0, Path(folder), engine=each.engine)
