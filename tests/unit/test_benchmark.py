@@ -96,7 +96,7 @@ def test_ensembles_agree_differ_or_say_nothing() -> None:
 
 
 def test_growth_is_timed_per_sphere_and_step() -> None:
-    table = time_growth(replace(SPEC, void_fraction=0.65), [Case("particles", 100, 1.0), Case("size_ratio", 150, 2.0)])
+    table = time_growth(replace(SPEC, void_fraction=0.65), [Case("particles", 150, 4.0), Case("size_ratio", 200, 2.0)])
     expected = 1e9 * table["wall_s"] / table["steps"] / table["particles"]
     assert table["ns_per_particle_step"].to_numpy() == pytest.approx(expected.to_numpy())
     assert list(table["series"]) == ["particles", "size_ratio"]
