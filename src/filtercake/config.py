@@ -72,6 +72,8 @@ Restitution = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER
 Friction = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False), TO_NUMBER]
 Cohesion = Annotated[float, Field(ge=0, allow_inf_nan=False), TO_NUMBER]
 
+ResidenceTime = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False), TO_NUMBER]
+
 EngineName = Literal["auto", "liggghts", "embedded", "liggghts_as_published"]
 
 
@@ -95,7 +97,7 @@ class SizeClass(Model):
 
 
 class Csd(Model):
-    """A crystal size distribution: a mixture of discrete sizes, or a CSV file."""
+    """A crystal size distribution: a mixture of discrete sizes, a CSV file, or the crystallizer's product."""
 
     label: Annotated[str, Field(max_length=60)] | None = Field(
         default=None, description="Name in figures and tables; the key if left out."
@@ -107,6 +109,9 @@ class Csd(Model):
         default=None,
         description="CSV with the columns size_um,volume_fraction; path relative to the study file.",
     )
+    residence_time_min: ResidenceTime | None = Field(
+        default=None, description="Product of the study's crystallizer at this residence time, min."
+    )
     truncate_below_volume_fraction: Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.0,
         description="Classes below this volume share are left out of the packing (not of the resistance).",
@@ -114,15 +119,38 @@ class Csd(Model):
 
     @model_validator(mode="after")
     def _one_source(self) -> Csd:
-        if (self.mixture is None) == (self.file is None):
-            raise ValueError("needs exactly one of mixture and file")
+        if [self.mixture, self.file, self.residence_time_min].count(None) != 2:
+            raise ValueError("needs exactly one of mixture, file and residence_time_min")
         return self
+
+
+class Crystallizer(Model):
+    """A mixed-suspension, mixed-product-removal crystallizer, whose residence time a sweep may vary."""
+
+    kinetics: Name = Field(description="Crystallization kinetics: a preset, or a name in kinetics_file.")
+    kinetics_file: str | None = Field(
+        default=None, description="YAML with kinetics of your own; path relative to the study file."
+    )
+    slurry_density_kg_m3: Annotated[float, Field(gt=0, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Crystals in the slurry, kg/m3 (= g/L)."
+    )
+    slurry_flow_m3_h: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=20.0, description="Slurry that leaves the crystallizer, m3/h; times the residence time, its volume."
+    )
+    bin_width_um: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=5.0, description="Width of the size classes, um (rounded to a whole number of classes)."
+    )
+    truncate_below_volume_fraction: Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=0.001, description="Classes below this volume share are left out of the packing, not of the resistance."
+    )
 
 
 class Material(Model):
     """The crystals, and the base value of every property a sweep may vary."""
 
-    density_kg_m3: Density = Field(description="Crystal density, kg/m3.")
+    density_kg_m3: Density | None = Field(
+        default=None, description="Crystal density, kg/m3; that of the crystallizer's kinetics if left out."
+    )
     youngs_modulus_MPa: YoungsModulus = Field(default=5.0, description="Young's modulus, MPa.")  # noqa: N815
     poisson_ratio: PoissonRatio = Field(default=0.2, description="Poisson's ratio.")
     restitution: Restitution = Field(default=0.3, description="Coefficient of restitution.")
@@ -131,6 +159,13 @@ class Material(Model):
     sphericity: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1.0, description="Sphericity in the resistance law; packings are of spheres."
     )
+
+    @property
+    def density(self) -> float:
+        """Crystal density, kg/m3, of a study that has been loaded."""
+        if self.density_kg_m3 is None:
+            raise ValueError("the study gives no crystal density and was not loaded")
+        return self.density_kg_m3
 
 
 class Packing(Model):
@@ -188,8 +223,11 @@ class Packing(Model):
 class Sweep(Model):
     """One block of points: every combination of the values given; what is left out keeps its base value."""
 
-    csd: Annotated[list[Name], BeforeValidator(_listed), Field(min_length=1)] = Field(
-        description="Names of distributions from csds."
+    csd: Annotated[list[Name], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+        default=None, description="Names of distributions from csds."
+    )
+    residence_time_min: Annotated[list[ResidenceTime], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+        default=None, description="Residence times of the crystallizer, min, instead of csd."
     )
     cohesion_kJ_m3: Annotated[list[Cohesion], BeforeValidator(_listed), Field(min_length=1)] | None = Field(  # noqa: N815
         default=None, description="Cohesion energy densities, kJ/m3."
@@ -209,6 +247,12 @@ class Sweep(Model):
     replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] | None = Field(
         default=None, description="Packings per point of this block, instead of packing.replicates."
     )
+
+    @model_validator(mode="after")
+    def _one_product(self) -> Sweep:
+        if (self.csd is None) == (self.residence_time_min is None):
+            raise ValueError("needs exactly one of csd and residence_time_min")
+        return self
 
 
 class Published(Model):
@@ -236,7 +280,8 @@ class Study(Model):
     """A parameter study: distributions, material, packing settings and the points to visit."""
 
     title: Annotated[str, Field(max_length=120)] = Field(default="", description="One line for figures and reports.")
-    csds: Annotated[dict[Name, Csd], Field(min_length=1)] = Field(description="The distributions by name.")
+    csds: dict[Name, Csd] = Field(default={}, description="The distributions by name.")
+    crystallizer: Crystallizer | None = Field(default=None, description="Where the crystals come from.")
     material: Material = Field(description="The crystals.")
     packing: Packing = Field(default=Packing(), description="How the packings are made.")
     sweeps: Annotated[list[Sweep], Field(min_length=1)] = Field(description="Blocks of points; their union is visited.")

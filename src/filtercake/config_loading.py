@@ -19,13 +19,22 @@ from filtercake.config import (
     FRICTIONLESS_TIME_STEP,
     LARGEST_RELATIVE_OVERLAP,
     NAME,
+    Crystallizer,
     Csd,
     Study,
     Workflow,
 )
+from filtercake.crystallizer import (
+    Kinetics,
+    SteadyState,
+    crystal_size_distribution,
+    get_kinetics,
+    load_kinetics,
+    steady_state,
+)
 from filtercake.csd import CrystalSizeDistribution, mixture, read_csd, truncate
-from filtercake.errors import ConfigError, CsdError, Problem
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND
+from filtercake.errors import ConfigError, CrystallizerError, CsdError, Problem
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND, MINUTE
 
 LARGEST_FILE = 1_000_000
 """Bytes of a configuration file beyond which it is surely not one."""
@@ -45,12 +54,15 @@ class LoadedCsd:
         Name in figures.
     file : Path or None
         The user's CSV it was read from.
+    crystallizer : SteadyState or None
+        The crystallizer that makes it.
     """
 
     full: CrystalSizeDistribution
     truncated: CrystalSizeDistribution
     label: str
     file: Path | None
+    crystallizer: SteadyState | None = None
 
 
 @dataclass(frozen=True)
@@ -128,15 +140,14 @@ def load_study(path: Path) -> LoadedStudy:
         With every problem found in the file and the files it names.
     """
     model = _parse(Study, read_yaml(path), str(path))
+    model, kinetics = _resolve_crystallizer(model, path)
     problems = list(_reference_problems(model, str(path)))
     csds: dict[str, LoadedCsd] = {}
     for name, csd in model.csds.items():
         try:
-            csds[name] = _load_csd(name, csd, path.parent)
-        except CsdError as error:
-            key = f"csds.{name}.{'file' if csd.file else 'mixture'}"
-            value = repr(csd.file) if csd.file else f"{len(csd.mixture or [])} classes"
-            problems.append(Problem(str(path), key, value, str(error)))
+            csds[name] = _load_csd(name, csd, path.parent, model.crystallizer, kinetics)
+        except (CsdError, CrystallizerError) as error:
+            problems.append(Problem(str(path), *_source_of(name, csd), str(error)))
     problems += _stability_problems(model, csds, str(path))
     if problems:
         raise ConfigError(problems)
@@ -268,21 +279,92 @@ def _did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def _load_csd(name: str, csd: Csd, folder: Path) -> LoadedCsd:
+def product_name(residence_time_min: float) -> str:
+    """Name of the crystallizer's product at a residence time, as a distribution of the study."""
+    return f"tau_{residence_time_min:g}min".replace(".", "p")
+
+
+def _resolve_crystallizer(model: Study, path: Path) -> tuple[Study, Kinetics | None]:
+    """Give the residence times of sweeps a distribution each, and the material the kinetics' density if it has none.
+
+    Raises
+    ------
+    ConfigError
+        If the kinetics are not known, or residence times or a density are asked for that nothing gives.
+    """
+    file = str(path)
+    crystallizer, material = model.crystallizer, model.material
+    if crystallizer is None:
+        asked = [f"csds.{name}" for name, csd in model.csds.items() if csd.residence_time_min is not None]
+        asked += [f"sweeps[{i}]" for i, sweep in enumerate(model.sweeps) if sweep.residence_time_min is not None]
+        problems = [
+            Problem(file, f"{key}.residence_time_min", "", "needs a crystallizer in the study") for key in asked
+        ]
+        if material.density_kg_m3 is None:
+            problems.append(Problem(file, "material.density_kg_m3", "(missing)", "must be given"))
+        if problems:
+            raise ConfigError(problems)
+        return model, None
+    kinetics = _kinetics(crystallizer, path)
+    if material.density_kg_m3 is None:
+        material = material.model_copy(update={"density_kg_m3": kinetics.density})
+    csds, sweeps = dict(model.csds), []
+    for sweep in model.sweeps:
+        times = sweep.residence_time_min
+        if times is not None:
+            for time in times:
+                name = product_name(time)
+                csds.setdefault(
+                    name,
+                    Csd(
+                        label=f"{time:g} min",
+                        residence_time_min=time,
+                        truncate_below_volume_fraction=crystallizer.truncate_below_volume_fraction,
+                    ),
+                )
+            sweep = sweep.model_copy(update={"csd": [product_name(time) for time in times]})
+        sweeps.append(sweep)
+    return model.model_copy(update={"csds": csds, "sweeps": sweeps, "material": material}), kinetics
+
+
+def _kinetics(crystallizer: Crystallizer, path: Path) -> Kinetics:
+    try:
+        own = load_kinetics(path.parent / crystallizer.kinetics_file) if crystallizer.kinetics_file else None
+        return get_kinetics(crystallizer.kinetics, own)
+    except CrystallizerError as error:
+        raise ConfigError([Problem(str(path), "crystallizer.kinetics", crystallizer.kinetics, str(error))]) from None
+
+
+def _source_of(name: str, csd: Csd) -> tuple[str, str]:
+    """Key and value that a distribution comes from."""
+    if csd.file:
+        return f"csds.{name}.file", repr(csd.file)
+    if csd.residence_time_min is not None:
+        return f"csds.{name}.residence_time_min", f"{csd.residence_time_min:g}"
+    return f"csds.{name}.mixture", f"{len(csd.mixture or [])} classes"
+
+
+def _load_csd(
+    name: str, csd: Csd, folder: Path, crystallizer: Crystallizer | None, kinetics: Kinetics | None
+) -> LoadedCsd:
     file = (folder / csd.file) if csd.file else None
+    state: SteadyState | None = None
     if file is not None:
         full = read_csd(file)
+    elif csd.residence_time_min is not None and crystallizer is not None and kinetics is not None:
+        state = steady_state(kinetics, csd.residence_time_min * MINUTE, crystallizer.slurry_density_kg_m3)
+        full = crystal_size_distribution(state.size_scale, crystallizer.bin_width_um * MICROMETRE)
     else:
         classes = csd.mixture or []
         full = mixture([c.size_um * MICROMETRE for c in classes], [c.volume_fraction for c in classes])
     truncated = truncate(full, csd.truncate_below_volume_fraction).csd
-    return LoadedCsd(full, truncated, csd.label or name, file)
+    return LoadedCsd(full, truncated, csd.label or name, file, state)
 
 
 def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
     """Names of distributions that the study does not define."""
     known = list(model.csds)
-    named = [(f"sweeps[{i}].csd[{j}]", name) for i, s in enumerate(model.sweeps) for j, name in enumerate(s.csd)]
+    named = [(f"sweeps[{i}].csd[{j}]", name) for i, s in enumerate(model.sweeps) for j, name in enumerate(s.csd or [])]
     named += [(f"published[{i}].csd", entry.csd) for i, entry in enumerate(model.published)]
     for key, name in named:
         if name not in model.csds:
@@ -317,11 +399,11 @@ def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> 
                 if cohesion > limit:
                     found[key] = Problem(file, key, f"{cohesion:g}", _over_cohesion(limit, modulus, poisson))
             step_us = model.packing.time_step_us
-            for name in sweep.csd if step_us is not None else []:
+            for name in (sweep.csd or []) if step_us is not None else []:
                 if name not in csds:
                     continue
                 rayleigh = contact.rayleigh_time_step(
-                    0.5 * csds[name].truncated.smallest, model.material.density_kg_m3, modulus, poisson
+                    0.5 * csds[name].truncated.smallest, model.material.density, modulus, poisson
                 )
                 if step_us is not None and step_us * MICROSECOND >= rayleigh:
                     allowed = (

@@ -14,7 +14,10 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from filtercake.config import Csd, Material, Packing, Published, SizeClass, Study, Sweep, Workflow
+from filtercake.config import Crystallizer, Csd, Material, Packing, Published, SizeClass, Study, Sweep, Workflow
+
+CRYSTALLIZER_EXAMPLE = {"kinetics": "ammonium_alum", "slurry_density_kg_m3": "200"}
+"""Values of the keys without a default, for the template."""
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -55,6 +58,10 @@ def study_template() -> str:
         f"    # {_text(Csd.model_fields['truncate_below_volume_fraction'])}",
         "    # truncate_below_volume_fraction: 0.001",
     ]
+    lines += ["", f"# {_text(Study.model_fields['crystallizer'])}", "# crystallizer:"]
+    for key, field in Crystallizer.model_fields.items():
+        lines.append(f"  # {_text(field)} Allowed: {_allowed(field)}.")
+        lines.append(f"  # {key}: {CRYSTALLIZER_EXAMPLE.get(key) or _yaml(field.get_default())}")
     for name, model, given in (("material", Material, {"density_kg_m3": "1180"}), ("packing", Packing, {})):
         lines += ["", f"# {_INTRO[name]}", f"{name}:" if given else f"# {name}:"]
         for key, field in model.model_fields.items():
@@ -87,6 +94,7 @@ def reference() -> str:
         ("A study: `config/studies/<name>.yaml`", Study),
         ("`csds.<name>`", Csd),
         ("`csds.<name>.mixture[]`", SizeClass),
+        ("`crystallizer`", Crystallizer),
         ("`material`", Material),
         ("`packing`", Packing),
         ("`sweeps[]`", Sweep),
@@ -145,6 +153,7 @@ def _yaml(value: Any) -> str:
 
 def _example(key: str) -> str:
     examples = {
+        "residence_time_min": "[15, 30, 45, 60] # instead of csd",
         "cohesion_kJ_m3": "[0, 25, 50]",
         "friction": "[0, 0.05]",
         "poisson_ratio": "[0.2, 0.3]",

@@ -140,7 +140,7 @@ def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution,
     for sweep in study.model.sweeps:
         axes = [_axis(study.model, sweep, name) for name in SWEPT]
         replicates = sweep.replicates or study.model.packing.replicates
-        for csd, values in itertools.product(sweep.csd, itertools.product(*axes)):
+        for csd, values in itertools.product(sweep.csd or [], itertools.product(*axes)):
             point = _point(study, csd, dict(zip(SWEPT, values, strict=True)), replicates, choose_engine)
             known = points.get(point.name)
             if known is None or known.replicates < replicates:
@@ -313,13 +313,13 @@ def _point(
     settings, material = study.model.packing, study.model.material
     csd = study.csds[csd_name].truncated
     modulus, poisson = swept["youngs_modulus_MPa"] * MEGAPASCAL, swept["poisson_ratio"]
-    rayleigh = contact.rayleigh_time_step(0.5 * csd.smallest, material.density_kg_m3, modulus, poisson)
+    rayleigh = contact.rayleigh_time_step(0.5 * csd.smallest, material.density, modulus, poisson)
     engine = settings.engine if settings.engine != "auto" else choose_engine(csd, settings.particles)
     spec = PackingSpec(
         particles=settings.particles,
         void_fraction=settings.void_fraction,
         settling_velocity=settings.settling_velocity_m_s,
-        density=material.density_kg_m3,
+        density=material.density,
         youngs_modulus=modulus,
         poisson_ratio=poisson,
         restitution=swept["restitution"],
@@ -335,7 +335,8 @@ def _point(
         time_limit=settings.time_limit_min * MINUTE,
         write_vtk=settings.write_vtk,
     )
-    return Point(_slug(csd_name, swept, study.model, spec, csd), study.name, csd_name, None, replicates, spec)
+    residence_time = study.model.csds[csd_name].residence_time_min
+    return Point(_slug(csd_name, swept, study.model, spec, csd), study.name, csd_name, residence_time, replicates, spec)
 
 
 def _slug(csd_name: str, swept: dict[str, float], study: Study, spec: PackingSpec, csd: CrystalSizeDistribution) -> str:

@@ -88,7 +88,7 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
                 **_measured_resistance(published_value(study, name, "resistance_m_kg", "measurement")),
                 "resistance_published_m_kg": _value(published_value(study, name, "resistance_m_kg", "simulation")),
                 "resistance_as_published_m_kg": (
-                    kozeny_carman(as_published, full, material.density_kg_m3, material.sphericity)
+                    kozeny_carman(as_published, full, material.density, material.sphericity)
                     if np.isfinite(as_published)
                     else np.nan
                 ),

@@ -15,6 +15,7 @@ from filtercake import engine_choice
 from filtercake.config import Study, Workflow
 from filtercake.config_loading import find_studies, load_studies, load_study, load_workflow, read_yaml
 from filtercake.errors import ConfigError, Problem
+from filtercake.study import expand
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -121,7 +122,14 @@ BROKEN: list[tuple[Any, ...]] = [
     # (change of the good study: what is replaced, by what; key; value shown; what is allowed)
     pytest.param("title:", "titel:", "titel", "'A study for tests'", "unknown key; allowed here: title", id="misspelt"),
     pytest.param("title:", "titel:", "titel", "", "did you mean title?", id="did you mean"),
-    pytest.param("sweeps:", "zzz: 1\nsweeps:", "zzz", "1", "unknown key; allowed here: title, csds, mat", id="unknown"),
+    pytest.param(
+        "sweeps:",
+        "zzz: 1\nsweeps:",
+        "zzz",
+        "1",
+        "unknown key; allowed here: title, csds, crystallizer, mat",
+        id="unknown",
+    ),
     pytest.param(
         "  density_kg_m3: 1180",
         "  density_kg_m3: 1180\n  frictoin: 0.1",
@@ -175,8 +183,8 @@ BROKEN: list[tuple[Any, ...]] = [
         "density_kg_m3: 1180",
         "density_kg_m3:",
         "material.density_kg_m3",
-        "None",
-        "must be a valid number",
+        "(missing)",
+        "must be given",
         id="empty value",
     ),
     pytest.param(
@@ -375,7 +383,7 @@ def test_an_unusable_csv_is_named(write_study, good_study: str, tmp_path: Path, 
 def test_a_distribution_has_exactly_one_source(write_study, good_study: str, source: str) -> None:
     problem = the_problem(write_study(good_study.replace("    mixture:\n" + MIXTURE, source)))
     assert problem.key == "csds.bimodal"
-    assert "needs exactly one of mixture and file" in problem.allowed
+    assert "needs exactly one of mixture, file and residence_time_min" in problem.allowed
 
 
 def test_a_truncation_that_leaves_nothing_is_named(write_study, good_study: str) -> None:
@@ -630,3 +638,74 @@ def test_auto_takes_liggghts_where_it_is_installed_and_suits(nowhere: Path, alum
     assert engine_choice.choose(small_csd, 100_000) == "liggghts"  # narrow
     assert engine_choice.choose(wide, 2000) == "liggghts"  # small
     assert engine_choice.choose(wide, 100_000) == "embedded"
+
+
+# --- a crystallizer ------------------------------------------------------------------------------------------------
+
+CRYSTALLIZER = """
+crystallizer:
+  kinetics: {kinetics}
+  slurry_density_kg_m3: 200
+material:
+  cohesion_kJ_m3: 50
+packing:
+  particles: 20000
+  void_fraction: 0.6
+sweeps:
+  - residence_time_min: [15, 7.5]
+"""
+
+
+def test_residence_times_become_distributions(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(CRYSTALLIZER.format(kinetics="ammonium_alum"), encoding="utf-8")
+    study = load_study(path)
+    assert list(study.csds) == ["tau_15min", "tau_7p5min"]
+    product = study.csds["tau_15min"]
+    assert product.crystallizer is not None
+    assert product.crystallizer.size_scale == pytest.approx(58.417e-6, rel=1e-5)
+    assert (product.truncated.smallest, product.truncated.largest) == pytest.approx((32.5e-6, 543.3e-6), abs=0.06e-6)
+    assert study.model.material.density == 2450.0
+    points = expand(study, lambda _csd, _n: "embedded")
+    assert [point.residence_time_min for point in points] == [15.0, 7.5]
+    assert points[0].name.startswith("tau_15min_s50_mu0_")
+
+
+def test_other_kinetics_are_one_word(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(CRYSTALLIZER.format(kinetics="potassium_nitrate"), encoding="utf-8")
+    study = load_study(path)
+    assert study.model.material.density == 2110.0
+    assert study.csds["tau_15min"].crystallizer.size_scale == pytest.approx(142.5e-6, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "key", "says"),
+    [
+        ("ammonium_alum", "amonium_alum", "crystallizer.kinetics", "did you mean ammonium_alum"),
+        ("crystallizer:", "title: none\nunknown:", "unknown", "unknown key"),
+        ("kg_m3: 200", "kg_m3: -1", "crystallizer.slurry_density_kg_m3", "greater than 0"),
+        ("[15, 7.5]", "[0]", "sweeps[0].residence_time_min[0]", "greater than 0"),
+        ("- residence", "- csd: a\n    residence", "sweeps[0]", "exactly one of csd and residence_time_min"),
+        ("  kinetics: ammonium_alum", "  kinetics: x\n  kinetics_file: no.yaml", "crystallizer.kinetics", "no.yaml"),
+    ],
+)
+def test_a_wrong_crystallizer_is_named(tmp_path: Path, before: str, after: str, key: str, says: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(CRYSTALLIZER.format(kinetics="ammonium_alum").replace(before, after), encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_study(path)
+    assert any(problem.key == key and says in problem.allowed for problem in caught.value.problems), caught.value
+
+
+def test_residence_times_need_a_crystallizer(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    text = "csds: {a: {residence_time_min: 5}}\nmaterial: {}\nsweeps: [{residence_time_min: 3}]\n"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_study(path)
+    assert {problem.key for problem in caught.value.problems} == {
+        "csds.a.residence_time_min",
+        "sweeps[0].residence_time_min",
+        "material.density_kg_m3",
+    }

@@ -14,6 +14,7 @@ from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
 from filtercake.provenance import packing_sources, sources
 from filtercake.study import expand as expand_points, with_engine
+from filtercake.units import MICROMETRE
 
 ROOT = Path(workflow.basedir)
 CONFIG_FILE = "config/config.yaml"
@@ -103,9 +104,14 @@ def figures_of(study):
 
 
 def csd_params(wildcards):
-    csd = study_of(wildcards).model.csds[wildcards.csd]
+    study = study_of(wildcards)
+    csd, state = study.model.csds[wildcards.csd], study.csds[wildcards.csd].crystallizer
     classes = [[item.size_um, item.volume_fraction] for item in csd.mixture or []]
-    return {"classes": classes, "truncation": csd.truncate_below_volume_fraction}
+    found = {"classes": classes, "truncation": csd.truncate_below_volume_fraction}
+    if state is not None:
+        found["size_scale_um"] = state.size_scale / MICROMETRE
+        found["bin_width_um"] = study.model.crystallizer.bin_width_um
+    return found
 
 
 def csd_file(wildcards):

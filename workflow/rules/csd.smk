@@ -4,7 +4,7 @@
 rule csd:
     input:
         file=csd_file,
-        library=library("csd"),
+        library=library("crystallizer"),
     output:
         "{results}/{study}/csd/{csd}.csv",
     log:

@@ -2,23 +2,24 @@
 
 from pathlib import Path
 
+from filtercake.crystallizer import crystal_size_distribution
 from filtercake.csd import mixture, read_csd, to_table, truncate
 from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.units import MICROMETRE
 
 
-def main(file, classes, truncation, output):
-    """Read or mix the classes and write the table."""
+def distribution(file, source):
+    """Read the file, mix the classes, or take the crystallizer's product."""
     if file:
-        full = read_csd(Path(file[0]))
-    else:
-        full = mixture([size * MICROMETRE for size, _ in classes], [fraction for _, fraction in classes])
-    table = to_table(full, truncate(full, truncation).csd)
-    with publish(Path(output)) as temporary:
-        table.to_csv(temporary, index=False)
+        return read_csd(Path(file[0]))
+    if "size_scale_um" in source:
+        return crystal_size_distribution(source["size_scale_um"] * MICROMETRE, source["bin_width_um"] * MICROMETRE)
+    classes = source["classes"]
+    return mixture([size * MICROMETRE for size, _ in classes], [fraction for _, fraction in classes])
 
 
-with job(snakemake.log[0]):
-    source = snakemake.params.source
-    main(list(snakemake.input.file), source["classes"], source["truncation"], snakemake.output[0])
+with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
+    full = distribution(list(snakemake.input.file), snakemake.params.source)
+    table = to_table(full, truncate(full, snakemake.params.source["truncation"]).csd)
+    table.to_csv(temporary, index=False)

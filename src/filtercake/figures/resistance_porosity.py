@@ -61,7 +61,7 @@ def draw(data: StudyData) -> Figure:
 
 def _resistance(data: StudyData, csd: str, porosity: float) -> float:
     material = data.study.material
-    return kozeny_carman(porosity, data.csds[csd][0], material.density_kg_m3, material.sphericity)
+    return kozeny_carman(porosity, data.csds[csd][0], material.density, material.sphericity)
 
 
 def _ink(data: StudyData, csd: str) -> str:
