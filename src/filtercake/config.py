@@ -145,6 +145,27 @@ class Crystallizer(Model):
     )
 
 
+class Filter(Model):
+    """The rotary drum filter that the crystallizer's slurry goes to."""
+
+    pressure_drop_kPa: Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
+        description="Pressure drop across cake and medium, kPa."
+    )
+    submerged_fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Fraction of the drum that is immersed."
+    )
+    rotation_rate_rpm: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Rotation rate of the drum, 1/min."
+    )
+    medium_resistance_1_m: Annotated[float, Field(ge=0, le=1e15, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Resistance of the filter medium, 1/m."
+    )
+    viscosity_mPa_s: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
+        default=1.0, description="Viscosity of the filtrate, mPa s."
+    )
+    liquid_density_kg_m3: Density = Field(default=1000.0, description="Density of the filtrate, kg/m3.")
+
+
 class Material(Model):
     """The crystals, and the base value of every property a sweep may vary."""
 
@@ -259,12 +280,17 @@ class Published(Model):
     """A published value to stand beside ours."""
 
     csd: Name = Field(description="Name of a distribution from csds.")
-    quantity: Literal["porosity", "resistance_m_kg", "system_dimension_um"] = Field(description="What was published.")
+    quantity: Literal[
+        "porosity", "resistance_m_kg", "system_dimension_um", "smallest_um", "largest_um", "filter_area_m2"
+    ] = Field(description="What was published.")
     value: Number = Field(description="The value, in the unit its name says.")
     source: Annotated[str, Field(max_length=80)] = Field(description="Where it is from, for the legend.")
     kind: Literal["simulation", "measurement"] = Field(description="Simulated or measured.")
     cohesion_kJ_m3: Cohesion | None = Field(default=None, description="At this cohesion, kJ/m3.")  # noqa: N815
     friction: Friction | None = Field(default=None, description="At this friction.")
+    particles: Annotated[int, Field(ge=1), TO_WHOLE] | None = Field(
+        default=None, description="For this number of spheres (system_dimension_um), if not the study's."
+    )
     low: Number | None = Field(default=None, description="Lower end, where only a range is known.")
     high: Number | None = Field(default=None, description="Upper end, where only a range is known.")
 
@@ -282,6 +308,7 @@ class Study(Model):
     title: Annotated[str, Field(max_length=120)] = Field(default="", description="One line for figures and reports.")
     csds: dict[Name, Csd] = Field(default={}, description="The distributions by name.")
     crystallizer: Crystallizer | None = Field(default=None, description="Where the crystals come from.")
+    filter: Filter | None = Field(default=None, description="Where the slurry goes; needs a crystallizer.")
     material: Material = Field(description="The crystals.")
     packing: Packing = Field(default=Packing(), description="How the packings are made.")
     sweeps: Annotated[list[Sweep], Field(min_length=1)] = Field(description="Blocks of points; their union is visited.")

@@ -300,6 +300,8 @@ def _resolve_crystallizer(model: Study, path: Path) -> tuple[Study, Kinetics | N
         problems = [
             Problem(file, f"{key}.residence_time_min", "", "needs a crystallizer in the study") for key in asked
         ]
+        if model.filter is not None:
+            problems.append(Problem(file, "filter", "", "needs a crystallizer in the study, for its slurry"))
         if material.density_kg_m3 is None:
             problems.append(Problem(file, "material.density_kg_m3", "(missing)", "must be given"))
         if problems:
@@ -322,7 +324,7 @@ def _resolve_crystallizer(model: Study, path: Path) -> tuple[Study, Kinetics | N
                         truncate_below_volume_fraction=crystallizer.truncate_below_volume_fraction,
                     ),
                 )
-            sweep = sweep.model_copy(update={"csd": [product_name(time) for time in times]})
+            sweep = sweep.model_copy(update={"csd": [product_name(time) for time in times], "residence_time_min": None})
         sweeps.append(sweep)
     return model.model_copy(update={"csds": csds, "sweeps": sweeps, "material": material}), kinetics
 

@@ -14,9 +14,16 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from filtercake.config import Crystallizer, Csd, Material, Packing, Published, SizeClass, Study, Sweep, Workflow
+from filtercake.config import Crystallizer, Csd, Filter, Material, Packing, Published, SizeClass, Study, Sweep, Workflow
 
-CRYSTALLIZER_EXAMPLE = {"kinetics": "ammonium_alum", "slurry_density_kg_m3": "200"}
+EXAMPLES = {
+    "kinetics": "ammonium_alum",
+    "slurry_density_kg_m3": "200",
+    "pressure_drop_kPa": "53.33",
+    "submerged_fraction": "0.3",
+    "rotation_rate_rpm": "0.2",
+    "medium_resistance_1_m": "5.0e+9",
+}
 """Values of the keys without a default, for the template."""
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,10 +65,11 @@ def study_template() -> str:
         f"    # {_text(Csd.model_fields['truncate_below_volume_fraction'])}",
         "    # truncate_below_volume_fraction: 0.001",
     ]
-    lines += ["", f"# {_text(Study.model_fields['crystallizer'])}", "# crystallizer:"]
-    for key, field in Crystallizer.model_fields.items():
-        lines.append(f"  # {_text(field)} Allowed: {_allowed(field)}.")
-        lines.append(f"  # {key}: {CRYSTALLIZER_EXAMPLE.get(key) or _yaml(field.get_default())}")
+    for part, optional in (("crystallizer", Crystallizer), ("filter", Filter)):
+        lines += ["", f"# {_text(Study.model_fields[part])}", f"# {part}:"]
+        for key, field in optional.model_fields.items():
+            lines.append(f"  # {_text(field)} Allowed: {_allowed(field)}.")
+            lines.append(f"  # {key}: {EXAMPLES.get(key) or _yaml(field.get_default())}")
     for name, model, given in (("material", Material, {"density_kg_m3": "1180"}), ("packing", Packing, {})):
         lines += ["", f"# {_INTRO[name]}", f"{name}:" if given else f"# {name}:"]
         for key, field in model.model_fields.items():
@@ -95,6 +103,7 @@ def reference() -> str:
         ("`csds.<name>`", Csd),
         ("`csds.<name>.mixture[]`", SizeClass),
         ("`crystallizer`", Crystallizer),
+        ("`filter`", Filter),
         ("`material`", Material),
         ("`packing`", Packing),
         ("`sweeps[]`", Sweep),

@@ -9,10 +9,12 @@ import pandas as pd
 
 from filtercake.config import Published, Study
 from filtercake.csd import CrystalSizeDistribution
+from filtercake.drum_filter import Cake, DrumFilter, area, design_table
+from filtercake.errors import FilterError
 from filtercake.packing.cloud import box_length
 from filtercake.resistance import kozeny_carman
 from filtercake.study import base_rows
-from filtercake.units import MICROMETRE
+from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
 
 Csds = dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
 
@@ -40,11 +42,16 @@ def published_value(study: Study, csd: str, quantity: str, kind: str) -> Publish
 def table1(study: Study, csds: Csds) -> pd.DataFrame:
     """Tabulate the system dimension L of every distribution (paper, Table 1).
 
-    The paper gives whole micrometres; ``system_dimension_whole_um`` is ours rounded down.
+    The published value may be for another number of spheres: ``system_dimension_at_published_um`` is ours for that.
     """
     rows = []
     for name, (_, truncated) in csds.items():
-        length = box_length(truncated, study.packing.particles, study.packing.void_fraction) / MICROMETRE
+        published = published_value(study, name, "system_dimension_um", "simulation")
+        particles = published.particles if published and published.particles else study.packing.particles
+        length, same = (
+            box_length(truncated, n, study.packing.void_fraction) / MICROMETRE
+            for n in (study.packing.particles, particles)
+        )
         rows.append(
             {
                 "csd": name,
@@ -52,11 +59,95 @@ def table1(study: Study, csds: Csds) -> pd.DataFrame:
                 "particles": study.packing.particles,
                 "void_fraction": study.packing.void_fraction,
                 "system_dimension_um": round(length, 2),
-                "system_dimension_whole_um": int(length),
-                "published_um": _value(published_value(study, name, "system_dimension_um", "simulation")),
+                "published_um": _value(published),
+                "published_particles": particles if published else None,
+                "system_dimension_at_published_um": round(same, 2) if published else None,
             }
         )
     return pd.DataFrame(rows)
+
+
+def table2(study: Study, csds: Csds) -> pd.DataFrame:
+    """Tabulate what each distribution keeps when its rare classes are left out of the packing (paper, Table 2)."""
+    rows = []
+    for name, (full, truncated) in csds.items():
+        kept = np.isin(full.size, truncated.size)
+        rows.append(
+            {
+                "csd": name,
+                "label": study.csds[name].label or name,
+                "residence_time_min": study.csds[name].residence_time_min,
+                "truncate_below_volume_fraction": study.csds[name].truncate_below_volume_fraction,
+                "classes": truncated.size.size,
+                "smallest_um": round(truncated.smallest / MICROMETRE, 2),
+                "largest_um": round(truncated.largest / MICROMETRE, 2),
+                "kept_volume_fraction": round(float(full.volume_fraction[kept].sum()), 5),
+                "published_smallest_um": _value(published_value(study, name, "smallest_um", "simulation")),
+                "published_largest_um": _value(published_value(study, name, "largest_um", "simulation")),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate the drum filter that every point's slurry needs (paper, eq. 10 and Fig. 14).
+
+    Returns
+    -------
+    DataFrame
+        Per point: crystallizer volume, porosity and resistance, the columns of
+        :data:`filtercake.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 % interval, and
+        the published area.
+
+    Raises
+    ------
+    FilterError
+        If the study has no filter, or its values leave the model's range.
+    """
+    if study.filter is None or study.crystallizer is None:
+        raise FilterError("the study has no filter: add the sections crystallizer and filter")
+    drum = drum_of(study)
+    flow = study.crystallizer.slurry_flow_m3_h / HOUR
+    names = [str(name) for name in summary["csd"]]
+    cakes = [
+        Cake(resistance, porosity, study.material.density, csds[name][0].sauter_mean, csds[name][1].largest)
+        for name, resistance, porosity in zip(
+            names, summary["resistance_m_kg"].to_list(), summary["porosity"].to_list(), strict=True
+        )
+    ]
+    columns = ["point", "csd", "residence_time_min", "cohesion_kJ_m3", "friction", "engine", "n", "n_failed"]
+    columns += ["porosity", "porosity_ci95", "resistance_m_kg", "resistance_ci95_m_kg"]
+    table = summary[columns].reset_index(drop=True)
+    table.insert(3, "crystallizer_volume_m3", flow * MINUTE * table["residence_time_min"])
+    table = pd.concat([table, design_table(drum, cakes, flow, study.filter.liquid_density_kg_m3)], axis=1)
+    for name, sign in (("filter_area_low_m2", -1.0), ("filter_area_high_m2", 1.0)):
+        ends = (table["resistance_m_kg"] + sign * table["resistance_ci95_m_kg"]).clip(lower=0.0)
+        known = ends.notna()
+        table.loc[known, name] = area(drum, ends[known].to_numpy(np.float64), flow)
+    table["published_area_m2"] = [
+        _value(published_value(study, name, "filter_area_m2", "simulation")) for name in names
+    ]
+    return table
+
+
+def drum_of(study: Study) -> DrumFilter:
+    """Return the study's drum filter, in SI.
+
+    Raises
+    ------
+    FilterError
+        If the study has none.
+    """
+    if study.filter is None or study.crystallizer is None:
+        raise FilterError("the study has no filter: add the sections crystallizer and filter")
+    return DrumFilter(
+        pressure_drop=study.filter.pressure_drop_kPa * KILOPASCAL,
+        submerged_fraction=study.filter.submerged_fraction,
+        rotation_rate=study.filter.rotation_rate_rpm / MINUTE,
+        medium_resistance=study.filter.medium_resistance_1_m,
+        viscosity=study.filter.viscosity_mPa_s * MILLIPASCAL_SECOND,
+        slurry_density=study.crystallizer.slurry_density_kg_m3,
+    )
 
 
 def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:

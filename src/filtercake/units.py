@@ -14,8 +14,11 @@ IntArray = NDArray[np.int64]
 MICROMETRE: Final = 1e-6
 MICROSECOND: Final = 1e-6
 MINUTE: Final = 60.0
+HOUR: Final = 3600.0
 KILOJOULE_PER_M3: Final = 1e3
 MEGAPASCAL: Final = 1e6
+KILOPASCAL: Final = 1e3
+MILLIPASCAL_SECOND: Final = 1e-3
 GRAVITY: Final = 9.81
 """Gravitational acceleration, m/s2 (physical constant used by the paper's script)."""
 

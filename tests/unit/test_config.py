@@ -127,7 +127,7 @@ BROKEN: list[tuple[Any, ...]] = [
         "zzz: 1\nsweeps:",
         "zzz",
         "1",
-        "unknown key; allowed here: title, csds, crystallizer, mat",
+        "unknown key; allowed here: title, csds, cry",
         id="unknown",
     ),
     pytest.param(

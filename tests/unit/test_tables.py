@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from math import nan
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from filtercake.config_loading import LoadedStudy, load_study
+from filtercake.errors import FilterError
+from filtercake.resistance import kozeny_carman
 from filtercake.study import expand, summarise
-from filtercake.tables import published_value, table1, table4
+from filtercake.tables import filter_design, published_value, table1, table2, table4
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -19,17 +22,75 @@ def pmma_study() -> LoadedStudy:
     return load_study(REPOSITORY / "config" / "studies" / "pmma.yaml")
 
 
+@pytest.fixture(scope="module")
+def alum_study() -> LoadedStudy:
+    return load_study(REPOSITORY / "config" / "studies" / "alum.yaml")
+
+
 def csds(study: LoadedStudy) -> dict:
     return {name: (loaded.full, loaded.truncated) for name, loaded in study.csds.items()}
 
 
 def test_table_1(pmma_study: LoadedStudy) -> None:
     table = table1(pmma_study.model, csds(pmma_study)).set_index("csd")
-    expected = {"pmma_75_25": (249.99, 249, 250), "pmma_50_50": (282.29, 282, 282), "pmma_25_75": (342.45, 342, 342)}
-    for name, (length, whole, published) in expected.items():
+    expected = {"pmma_75_25": (249.99, 250), "pmma_50_50": (282.29, 282), "pmma_25_75": (342.45, 342)}
+    for name, (length, published) in expected.items():
         assert table.loc[name, "system_dimension_um"] == pytest.approx(length, abs=0.006)
-        assert table.loc[name, "system_dimension_whole_um"] == whole
+        assert table.loc[name, "system_dimension_at_published_um"] == table.loc[name, "system_dimension_um"]
         assert table.loc[name, "published_um"] == published
+
+
+TIMES = {"tau_15min": 5046, "tau_30min": 5808, "tau_45min": 6352, "tau_60min": 6658}
+
+
+def test_table_1_of_alum_is_for_another_number_of_spheres(alum_study: LoadedStudy) -> None:
+    table = table1(alum_study.model, csds(alum_study)).set_index("csd")
+    for name, published in TIMES.items():
+        assert table.loc[name, "published_um"] == published
+        assert table.loc[name, "published_particles"] == 100_000
+        assert round(table.loc[name, "system_dimension_at_published_um"]) == published
+        ratio = table.loc[name, "system_dimension_um"] / table.loc[name, "system_dimension_at_published_um"]
+        assert ratio == pytest.approx((table.loc[name, "particles"] / 100_000) ** (1 / 3), rel=1e-5)
+
+
+def test_table_2(alum_study: LoadedStudy) -> None:
+    table = table2(alum_study.model, csds(alum_study)).set_index("csd")
+    printed = [(32.5, 543.3, 0.981), (37.6, 613.4, 0.979), (42.6, 653.4, 0.977), (42.5, 688.2, 0.976)]
+    for name, (smallest, largest, kept) in zip(TIMES, printed, strict=True):
+        row = table.loc[name]
+        assert (row["published_smallest_um"], row["published_largest_um"]) == (smallest, largest)
+        assert (row["smallest_um"], row["largest_um"]) == pytest.approx((smallest, largest), abs=0.06)
+        assert row["kept_volume_fraction"] == pytest.approx(kept, abs=0.001)
+
+
+def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> None:
+    rows = []
+    printed = {"tau_15min": (0.293, 3.44), "tau_30min": (0.2925, 3.15), "tau_45min": (0.2925, 3.00)}
+    printed["tau_60min"] = (0.292, 2.905)
+    for point in expand(alum_study, lambda _csd, _n: "embedded"):
+        porosity = printed[point.csd][0]
+        alpha = kozeny_carman(porosity, alum_study.csds[point.csd].full, 2450.0)
+        for sign in (-1, 1):
+            row = {**point.row(), "status": "ok", "porosity": porosity, "porosity_as_published": porosity}
+            rows.append({**row, "resistance_m_kg": alpha * (1 + 0.01 * sign)})
+    replicates = pd.DataFrame(rows)
+    for column in ("resistance_sauter_m_kg", "soft_contact_compaction", "overlap_max", "wall_s"):
+        replicates[column] = 1.0
+    table = filter_design(alum_study.model, csds(alum_study), summarise(replicates)).set_index("csd")
+    assert list(table["crystallizer_volume_m3"]) == pytest.approx([5, 10, 15, 20])
+    for name, (_, area) in printed.items():
+        row = table.loc[name]
+        # the classes hold 0.5 % more x/d2 than the closed form that the printed areas follow from
+        assert row["filter_area_m2"] == pytest.approx(area, rel=0.004)
+        assert row["filter_area_low_m2"] < row["filter_area_m2"] < row["filter_area_high_m2"]
+        assert 0.50 < row["medium_share"] < 0.60
+    # the paper's text gives the first and the last
+    assert table["published_area_m2"].to_list() == pytest.approx([3.4, nan, nan, 2.9], nan_ok=True)
+
+
+def test_a_study_without_a_filter_has_no_design(pmma_study: LoadedStudy) -> None:
+    with pytest.raises(FilterError, match="has no filter"):
+        filter_design(pmma_study.model, csds(pmma_study), pd.DataFrame())
 
 
 def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:

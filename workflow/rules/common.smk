@@ -99,6 +99,12 @@ def point_rows(wildcards):
     return [point.as_dict() for point in KNOWN_POINTS[wildcards.study].values()]
 
 
+def filter_tables(wildcards):
+    """The filter's table, where the study has a filter."""
+    has_one = study_of(wildcards).model.filter is not None
+    return [f"{RESULTS}/{wildcards.study}/tables/filter.csv"] if has_one else []
+
+
 def figures_of(study):
     return catalogue.figures_of(KNOWN_POINTS[study].values(), KNOWN[study].model)
 

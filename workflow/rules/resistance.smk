@@ -77,6 +77,7 @@ rule tables:
         library=library("tables"),
     output:
         table1="{results}/{study}/tables/table1.csv",
+        table2="{results}/{study}/tables/table2.csv",
         table4="{results}/{study}/tables/table4.csv",
         comparison="{results}/{study}/tables/comparison.csv",
     log:
@@ -96,8 +97,33 @@ rule tables:
         "../scripts/tables.py"
 
 
+rule filter_design:
+    input:
+        summary="{results}/{study}/summary.csv",
+        csds=csd_tables,
+        library=library("tables"),
+    output:
+        "{results}/{study}/tables/filter.csv",
+    log:
+        "{results}/{study}/logs/filter.log",
+    benchmark:
+        "{results}/{study}/benchmarks/filter.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
+    message:
+        "filter of {wildcards.study}"
+    script:
+        "../scripts/filter.py"
+
+
 rule provenance:
     input:
+        filter_tables,
         "{results}/{study}/points.csv",
         "{results}/{study}/tables/table1.csv",
         summary="{results}/{study}/summary.csv",

@@ -8,13 +8,14 @@ from filtercake.config import Study
 from filtercake.csd import from_table
 from filtercake.job import job
 from filtercake.packing.result import publish
-from filtercake.tables import comparison, table1, table4
+from filtercake.tables import comparison, table1, table2, table4
 
 with job(snakemake.log[0]):
     study = Study.model_validate(snakemake.params.study)
     csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds}
     for output, table in (
         (snakemake.output.table1, table1(study, csds)),
+        (snakemake.output.table2, table2(study, csds)),
         (snakemake.output.table4, table4(study, csds, pd.read_csv(snakemake.input.summary))),
         (snakemake.output.comparison, comparison(study, pd.read_csv(snakemake.input.replicates))),
     ):
