@@ -487,8 +487,9 @@ def _make_move(frictional: bool) -> Callable[..., tuple[float, float]]:
         time_step: float,
         frame: float,
         frame_speed: float,
+        gravity: float,
     ) -> tuple[float, float]:
-        """Kick and move spheres ``begin`` to ``end``.
+        """Kick and move spheres ``begin`` to ``end``, and leave their weight in ``force`` for the next step to add to.
 
         Returns the largest squared distance from their reference and the largest squared speed, in the frame.
         """
@@ -503,12 +504,14 @@ def _make_move(frictional: bool) -> Callable[..., tuple[float, float]]:
             z = state[i, Z] + time_step * w
             state[i, U], state[i, V], state[i, W] = u, v, w
             state[i, X], state[i, Y], state[i, Z] = x, y, z
+            force[i, 0], force[i, 1], force[i, 2] = 0.0, 0.0, -gravity * state[i, MASS]
             moved_x, moved_y, moved_z = x - reference[i, 0], y - reference[i, 1], z - reference[i, 2] - frame
             away = moved_x * moved_x + moved_y * moved_y + moved_z * moved_z
             if frictional:
                 turn = scale / (0.4 * state[i, RADIUS] * state[i, RADIUS])
                 for k in range(3):
                     spin[i, k] += turn * torque[i, k]
+                    torque[i, k] = 0.0
             if not away <= farthest:  # keeps what is not a number, too
                 farthest = away
             rising = w - frame_speed
@@ -584,6 +587,13 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
         limit = 0.25 * skin * skin
         drift, speed = np.zeros(parts), np.zeros(parts)
         frame_speed = frame_step / time_step
+        if not ready:
+            for t in prange(parts):
+                for i in range(n):
+                    force[t, i, 0] = force[t, i, 1] = 0.0
+                    force[t, i, 2] = -law.gravity * state[i, MASS] if t == 0 else 0.0
+                    if frictional:
+                        torque[t, i, 0] = torque[t, i, 1] = torque[t, i, 2] = 0.0
         while True:
             if not ready:
                 if slack < 0.0:
@@ -594,11 +604,6 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                         slack = np.inf  # every pair is near
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
-                    for i in range(n):
-                        force[t, i, 0] = force[t, i, 1] = 0.0
-                        force[t, i, 2] = -law.gravity * state[i, MASS] if t == 0 else 0.0
-                        if frictional:
-                            torque[t, i, 0] = torque[t, i, 1] = torque[t, i, 2] = 0.0
                     pair_forces(
                         bounds[t], bounds[t + 1], state, spin, force[t], torque[t], pairs, law, length, spring_step
                     )
@@ -608,8 +613,10 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                             for other in range(1, parts):
                                 for k in range(3):
                                     force[0, i, k] += force[other, i, k]
+                                    force[other, i, k] = 0.0
                                     if frictional:
                                         torque[0, i, k] += torque[other, i, k]
+                                        torque[other, i, k] = 0.0
                 floor_forces(grounded, state, spin, force[0], torque[0], floor, floor_spring, law, spring_step)
                 ready = True
             if done == steps:
@@ -630,6 +637,7 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                     time_step,
                     frame,
                     frame_speed,
+                    law.gravity,
                 )
             slack -= 2.0 * math.sqrt(speed.max()) * time_step
             done += 1
