@@ -121,7 +121,9 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
     table.insert(3, "crystallizer_volume_m3", flow * MINUTE * table["residence_time_min"])
     table = pd.concat([table, design_table(drum, cakes, flow, study.filter.liquid_density_kg_m3)], axis=1)
     for name, sign in (("filter_area_low_m2", -1.0), ("filter_area_high_m2", 1.0)):
-        ends = (table["resistance_m_kg"] + sign * table["resistance_ci95_m_kg"]).clip(lower=0.0)
+        # an interval wider than the mean ends just above 0: without a medium, eq. 10 needs some resistance
+        smallest = float(np.finfo(np.float64).tiny)
+        ends = (table["resistance_m_kg"] + sign * table["resistance_ci95_m_kg"]).clip(lower=smallest)
         known = ends.notna()
         table.loc[known, name] = area(drum, ends[known].to_numpy(np.float64), flow)
     table["published_area_m2"] = [

@@ -77,6 +77,10 @@ POINTS: list[tuple[str, str, dict[str, float], list[float | None]]] = [
 ]
 
 
+EVERYWHERE = [name for name, spec in FIGURES.items() if spec.needs(Study.model_validate(STUDY))]
+"""Figures that need neither a crystallizer nor truncated sizes."""
+
+
 def spheres(replicate: int, csd: CrystalSizeDistribution) -> Packing:
     """Spheres on a shaken lattice, apart from each other, with a record of their settling."""
     random = np.random.default_rng(replicate)
@@ -161,7 +165,7 @@ def row(data: StudyData, point: str) -> pd.Series:
     return data.summary.set_index("point").loc[point]
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", EVERYWHERE)
 class TestEveryFigure:
     def test_all_axes_are_labelled_with_units(self, name: str, data: StudyData) -> None:
         figure = draw(name, data)

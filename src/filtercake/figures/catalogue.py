@@ -49,16 +49,27 @@ class StudyData:
     packings: Path
 
 
+def _always(_anything: object) -> bool:
+    return True
+
+
 @dataclass(frozen=True)
 class FigureSpec:
-    """A figure's module below ``filtercake.figures`` and whether a list of points gives it something to show."""
+    """A figure's module below ``filtercake.figures``, and what gives it something to show.
+
+    Attributes
+    ----------
+    module : str
+        Its module.
+    applies : callable
+        Whether a list of points does.
+    needs : callable
+        Whether a study's model does.
+    """
 
     module: str
-    applies: Callable[[list[Point]], bool]
-
-
-def _always(_points: list[Point]) -> bool:
-    return True
+    applies: Callable[[list[Point]], bool] = _always
+    needs: Callable[[Study], bool] = _always
 
 
 def _varies(name: str) -> Callable[[list[Point]], bool]:
@@ -71,23 +82,44 @@ def _varies(name: str) -> Callable[[list[Point]], bool]:
     return applies
 
 
+def _truncates(study: Study) -> bool:
+    return any(csd.truncate_below_volume_fraction > 0.0 for csd in study.csds.values())
+
+
+def _compares_products(study: Study) -> bool:
+    return sum(csd.residence_time_min is not None for csd in study.csds.values()) > 1
+
+
+def _crystallizes(study: Study) -> bool:
+    return study.crystallizer is not None
+
+
+def _filters(study: Study) -> bool:
+    return study.filter is not None
+
+
 FIGURES: dict[str, FigureSpec] = {
-    "fig03_porosity_trajectory": FigureSpec("trajectory", _always),
-    "fig08_resistance_vs_porosity": FigureSpec("resistance_porosity", _always),
+    "fig03_porosity_trajectory": FigureSpec("trajectory"),
+    "fig05_truncation": FigureSpec("truncation", needs=_truncates),
+    "fig08_resistance_vs_porosity": FigureSpec("resistance_porosity"),
     "fig09_porosity_vs_cohesion": FigureSpec("porosity_cohesion", _varies("cohesion")),
     "fig10_resistance_vs_cohesion": FigureSpec("resistance_cohesion", _varies("cohesion")),
+    "fig12_distributions": FigureSpec("distributions", needs=_compares_products),
+    "fig13_growth_nucleation": FigureSpec("crystallizer", needs=_crystallizes),
+    "fig14_resistance_area": FigureSpec("filter_area", needs=_filters),
+    "filter_area_sensitivity": FigureSpec("filter_sensitivity", needs=_filters),
     "sensitivity_poisson_restitution": FigureSpec(
         "sensitivity", lambda points: _varies("poisson_ratio")(points) or _varies("restitution")(points)
     ),
-    "packing_cross_section": FigureSpec("cross_section", _always),
-    "packing_porosity_profile": FigureSpec("profile", _always),
+    "packing_cross_section": FigureSpec("cross_section"),
+    "packing_porosity_profile": FigureSpec("profile"),
 }
 
 
-def figures_of(points: Iterable[Point], study: Study) -> list[str]:  # noqa: ARG001 - later figures depend on the model
+def figures_of(points: Iterable[Point], study: Study) -> list[str]:
     """Names of the figures a study has."""
     listed = list(points)
-    return [name for name, spec in FIGURES.items() if spec.applies(listed)]
+    return [name for name, spec in FIGURES.items() if spec.applies(listed) and spec.needs(study)]
 
 
 def module_of(figure: str) -> str:

@@ -9,9 +9,12 @@ import numpy as np
 import pandas as pd
 
 from filtercake.config import Published
+from filtercake.crystallizer import SteadyState, get_kinetics, steady_state
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
 from filtercake.study import base_rows
+from filtercake.tables import filter_design
+from filtercake.units import HOUR, MINUTE
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,6 +68,45 @@ def varied(data: StudyData, free: tuple[str, ...], *names: str) -> list[tuple[st
 def published(data: StudyData, csd: str, quantity: str) -> list[Published]:
     """List the published values of a quantity for a distribution."""
     return [value for value in data.study.published if (value.csd, value.quantity) == (csd, quantity)]
+
+
+OWN_KINETICS = "the kinetics are the study's own file, which a figure does not read"
+
+
+def products(data: StudyData) -> list[tuple[str, float]]:
+    """Distributions that the crystallizer makes, with their residence times in min, shortest first."""
+    times = ((name, csd.residence_time_min) for name, csd in data.study.csds.items())
+    return sorted(((name, time) for name, time in times if time is not None), key=lambda item: item[1])
+
+
+def crystallizer_volume(data: StudyData, residence_time_min: float) -> float:
+    """Volume of the study's crystallizer at a residence time, m3; nan where there is none."""
+    crystallizer = data.study.crystallizer
+    return crystallizer.slurry_flow_m3_h * residence_time_min * MINUTE / HOUR if crystallizer else float("nan")
+
+
+def steady(data: StudyData, residence_time_min: float) -> SteadyState | None:
+    """Return the study's crystallizer at a residence time; None without one or with kinetics from a file."""
+    crystallizer = data.study.crystallizer
+    if crystallizer is None or crystallizer.kinetics_file is not None:
+        return None
+    kinetics = get_kinetics(crystallizer.kinetics)
+    return steady_state(kinetics, residence_time_min * MINUTE, crystallizer.slurry_density_kg_m3)
+
+
+def filtered(data: StudyData) -> pd.DataFrame:
+    """Tabulate the filter of every product at the base material (see ``filter_design``), smallest crystallizer first.
+
+    ``medium_share_low`` and ``medium_share_high`` are the medium's shares at the ends of the resistance's interval.
+    """
+    rows = base_points(data)
+    rows = rows[rows["residence_time_min"].notna()]
+    table = filter_design(data.study, data.csds, rows).sort_values("crystallizer_volume_m3", kind="stable")
+    # the share is the area of the medium alone over the area needed
+    alone = table["medium_share"] * table["filter_area_m2"]
+    table["medium_share_low"] = alone / table["filter_area_high_m2"]
+    table["medium_share_high"] = alone / table["filter_area_low_m2"]
+    return table.reset_index(drop=True)
 
 
 def records(data: StudyData, point: str) -> tuple[list[tuple[int, dict[str, Any]]], str]:

@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
 from filtercake.config import Published
@@ -138,7 +138,16 @@ def shift(artists: Iterable[Artist], axes: Axes, place: int, count: int) -> None
 
 
 def error_line(
-    axes: Axes, rows: pd.DataFrame, x: str, y: str, half: str, *, label: str, index: int, place: int = 0, count: int = 1
+    axes: Axes,
+    rows: pd.DataFrame,
+    x: str,
+    y: str,
+    interval: str | tuple[str, str],
+    *,
+    label: str,
+    index: int,
+    place: int = 0,
+    count: int = 1,
 ) -> None:
     """Plot a series of means with their intervals; points without a mean are crosses above the axes.
 
@@ -148,8 +157,10 @@ def error_line(
         Where.
     rows : DataFrame
         The points of the series, in order.
-    x, y, half : str
-        Columns of the abscissa, the means and the half-widths of their intervals.
+    x, y : str
+        Columns of the abscissa and the means.
+    interval : str or tuple of str
+        Column of the half-widths of their intervals, or columns of the lower and the upper ends.
     label : str
         Name of the series.
     index : int
@@ -159,10 +170,15 @@ def error_line(
     """
     positions, means = rows[x].to_numpy(np.float64), rows[y].to_numpy(np.float64)
     good = np.isfinite(means)
+    if isinstance(interval, str):
+        reach = rows[interval].to_numpy(np.float64)[good]
+    else:
+        low, high = (rows[name].to_numpy(np.float64) for name in interval)
+        reach = np.stack([means - low, high - means])[:, good]
     drawn = axes.errorbar(
         positions[good],
         means[good],
-        yerr=rows[half].to_numpy(np.float64)[good],
+        yerr=reach,
         color=colour(index),
         marker=marker(index),
         capsize=2.0,
@@ -246,15 +262,53 @@ def resistance_axis(axes: Axes, values: FloatArray, *, log: bool = False, factor
     factor : str
         Words before the unit.
     """
-    finite = values[np.isfinite(values)]
-    exponent = int(np.floor(np.log10(finite.max()))) if finite.size else 9
     if log:
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
         axes.yaxis.set_minor_formatter(NullFormatter())
+    power_axis(axes, values, f"Specific cake resistance{factor}", "m/kg", otherwise=9)
+
+
+def volume_axis(axes: Axes, largest: float) -> None:
+    """Label the x axis as crystallizer volume, from zero to a little over the largest (m3)."""
+    axes.set_xlabel("Crystallizer volume (m³)")
+    axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    if np.isfinite(largest):
+        axes.set_xlim(0.0, 1.06 * largest)
+
+
+def power_axis(axes: Axes, values: FloatArray, name: str, unit: str, *, otherwise: int = 0) -> None:
+    """Label the y axis in a power of ten of a unit; the data stay in the unit.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    values : ndarray
+        What is shown; the largest finite one chooses the power of ten.
+    name, unit : str
+        What is shown (may end in a line break), and in what.
+    otherwise : int
+        The power of ten where no value is finite.
+    """
+    finite = values[np.isfinite(values)]
+    exponent = int(np.floor(np.log10(finite.max()))) if finite.size else otherwise
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
-    power = str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    axes.set_ylabel(f"Specific cake resistance{factor} (10{power} m/kg)")
+    axes.set_ylabel(f"{name} ({power_of_ten(exponent)} {unit})".replace("\n ", "\n"))
+
+
+def power_of_ten(exponent: int) -> str:
+    """Write a power of ten as readers know it."""
+    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def scientific(value: float, digits: int = 3) -> str:
+    """Write a number as a multiple of a power of ten; zero and powers of ten without a factor."""
+    if value == 0.0:
+        return "0"
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    power = power_of_ten(int(exponent))
+    return power if float(mantissa) == 1.0 else f"{float(mantissa):g}·{power}"
 
 
 def legend(figure: Figure, axes: Iterable[Axes], columns: int = 2, extra: Sequence[Artist] = ()) -> None:

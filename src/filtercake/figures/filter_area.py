@@ -1,0 +1,89 @@
+"""Cake resistance, filter area and the medium's share against the crystallizer's volume (paper, Fig. 14)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from filtercake.figures import selection, style
+
+if TYPE_CHECKING:
+    from filtercake.figures.catalogue import StudyData
+
+VOLUME = "crystallizer_volume_m3"
+ASIDE = 2
+"""Places that published values stand to the right of ours."""
+QUANTITIES = ("resistance_m_kg", "filter_area_m2")
+OURS = "this work, 95 % interval"
+
+
+def draw(data: StudyData) -> Figure:
+    """Draw three panels over one abscissa, with the published resistances and areas beside ours."""
+    figure, panels = style.panels(3, width=style.SINGLE, height=5.6, sharex=True)
+    resistance, area, share = panels
+    table = selection.filtered(data)
+    percent = table.assign(
+        **{name: 100.0 * table[name] for name in ("medium_share", "medium_share_low", "medium_share_high")}
+    )
+    _series(resistance, table, "resistance_m_kg", "resistance_ci95_m_kg")
+    _series(area, table, "filter_area_m2", ("filter_area_low_m2", "filter_area_high_m2"))
+    _series(share, percent, "medium_share", ("medium_share_low", "medium_share_high"))
+    published(resistance, data, table, "resistance_m_kg")
+    published(area, data, table, "filter_area_m2")
+    style.resistance_axis(resistance, table["resistance_m_kg"].to_numpy())
+    resistance.set_ylabel(resistance.get_ylabel().replace("Specific cake", "Specific cake\n"))
+    area.set_ylabel("Filter area (m²)")
+    share.set_ylabel("Share of the medium\nin the resistance (%)")
+    style.volume_axis(share, float(table[VOLUME].max()))
+    style.legend(figure, panels, columns=1)
+    notes = ["error bars: 95 % intervals of the mean", operating_point(data), fall(table)]
+    if any(line.get_gid() == "published" for axes in panels for line in axes.get_lines()):
+        notes.append("published values are set a little to the right")
+    style.footer(figure, table, *notes)
+    return figure
+
+
+def published(axes: Axes, data: StudyData, table: pd.DataFrame, quantity: str) -> None:
+    """Plot the published values of a quantity at the volumes of the products they belong to."""
+    for csd, volume in zip(table["csd"], table[VOLUME], strict=True):
+        for value in selection.published(data, str(csd), quantity):
+            if value.low is not None and value.high is not None:
+                style.published_range(axes, float(volume), value.low, value.high, colour=style.INK)
+            else:
+                style.published_point(axes, float(volume), value.value, value)
+                style.shift(axes.get_lines()[-1:], axes, ASIDE, 1)  # beside ours, which it would cover
+
+
+def fall(table: pd.DataFrame) -> str:
+    """Say by how much resistance and area fall from the smallest to the largest crystallizer."""
+    good = table[table["resistance_m_kg"].notna()]
+    if len(good) < 2:
+        return ""
+    ends = good.iloc[[0, -1]]
+    resistance, area = (100.0 * (ends[name].iloc[1] / ends[name].iloc[0] - 1.0) for name in QUANTITIES)
+    first, last = ends[VOLUME]
+    return (
+        f"from {first:g} to {last:g} m³ the resistance changes by {resistance:+.0f} % and the area by {area:+.0f} %"
+    ).replace("-", "−")
+
+
+def operating_point(data: StudyData) -> str:
+    """Say in words where the filter works."""
+    drum = data.study.filter
+    if drum is None:
+        return ""
+    return (
+        f"{drum.pressure_drop_kPa:g} kPa, medium {style.scientific(drum.medium_resistance_1_m)} 1/m, "
+        f"{drum.rotation_rate_rpm:g} rpm, {100.0 * drum.submerged_fraction:g} % immersed"
+    )
+
+
+def _series(axes: Axes, table: pd.DataFrame, column: str, interval: str | tuple[str, str]) -> None:
+    style.error_line(axes, table, VOLUME, column, interval, label=OURS, index=0)
+    for line in axes.get_lines():
+        line.set_markersize(3.0)  # the intervals are small
+    if table[column].isna().all():
+        style.nothing(axes, style.ALL_FAILED if len(table) else "no point at the base material")
