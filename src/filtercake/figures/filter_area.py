@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.figures.filtered import filtered
 
 if TYPE_CHECKING:
     from filtercake.figures.catalogue import StudyData
@@ -24,7 +25,7 @@ def draw(data: StudyData) -> Figure:
     """Draw three panels over one abscissa, with the published resistances and areas beside ours."""
     figure, panels = style.panels(3, width=style.SINGLE, height=5.6, sharex=True)
     resistance, area, share = panels
-    table = selection.filtered(data)
+    table = filtered(data)
     percent = table.assign(
         **{name: 100.0 * table[name] for name in ("medium_share", "medium_share_low", "medium_share_high")}
     )

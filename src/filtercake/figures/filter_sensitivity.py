@@ -13,8 +13,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from filtercake.drum_filter import DrumFilter, medium_share, resistance_for_cake_share
 from filtercake.drum_filter import area as filter_area
-from filtercake.figures import selection, style
+from filtercake.figures import style
 from filtercake.figures.filter_area import VOLUME, operating_point, published
+from filtercake.figures.filtered import filtered
 from filtercake.tables import drum_of
 from filtercake.units import HOUR, KILOPASCAL, FloatArray
 
@@ -40,7 +41,7 @@ def draw(data: StudyData) -> Figure:
     own = drum.pressure_drop / KILOPASCAL
     pressures = sorted({*PRESSURES, float(f"{own:.12g}")})
     media = sorted({*MEDIA, drum.medium_resistance})
-    table = selection.filtered(data)
+    table = filtered(data)
     figure, panels = style.panels(len(pressures) + 1, width=style.DOUBLE, height=6.0, columns=2)
     *areas, share = panels
     for axes, pressure in zip(areas, pressures, strict=True):

@@ -13,7 +13,6 @@ from filtercake.crystallizer import SteadyState, get_kinetics, steady_state
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
 from filtercake.study import base_rows
-from filtercake.tables import filter_design
 from filtercake.units import HOUR, MINUTE
 
 if TYPE_CHECKING:
@@ -92,21 +91,6 @@ def steady(data: StudyData, residence_time_min: float) -> SteadyState | None:
         return None
     kinetics = get_kinetics(crystallizer.kinetics)
     return steady_state(kinetics, residence_time_min * MINUTE, crystallizer.slurry_density_kg_m3)
-
-
-def filtered(data: StudyData) -> pd.DataFrame:
-    """Tabulate the filter of every product at the base material (see ``filter_design``), smallest crystallizer first.
-
-    ``medium_share_low`` and ``medium_share_high`` are the medium's shares at the ends of the resistance's interval.
-    """
-    rows = base_points(data)
-    rows = rows[rows["residence_time_min"].notna()]
-    table = filter_design(data.study, data.csds, rows).sort_values("crystallizer_volume_m3", kind="stable")
-    # the share is the area of the medium alone over the area needed
-    alone = table["medium_share"] * table["filter_area_m2"]
-    table["medium_share_low"] = alone / table["filter_area_high_m2"]
-    table["medium_share_high"] = alone / table["filter_area_low_m2"]
-    return table.reset_index(drop=True)
 
 
 def records(data: StudyData, point: str) -> tuple[list[tuple[int, dict[str, Any]]], str]:

@@ -1,0 +1,28 @@
+"""The filter of every product; a module of its own, so that only the figures that show it follow the tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from filtercake.figures import selection
+from filtercake.tables import filter_design
+
+if TYPE_CHECKING:
+    from filtercake.figures.catalogue import StudyData
+
+
+def filtered(data: StudyData) -> pd.DataFrame:
+    """Tabulate the filter of every product at the base material (see ``filter_design``), smallest crystallizer first.
+
+    ``medium_share_low`` and ``medium_share_high`` are the medium's shares at the ends of the resistance's interval.
+    """
+    rows = selection.base_points(data)
+    rows = rows[rows["residence_time_min"].notna()]
+    table = filter_design(data.study, data.csds, rows).sort_values("crystallizer_volume_m3", kind="stable")
+    # the share is the area of the medium alone over the area needed
+    alone = table["medium_share"] * table["filter_area_m2"]
+    table["medium_share_low"] = alone / table["filter_area_high_m2"]
+    table["medium_share_high"] = alone / table["filter_area_low_m2"]
+    return table.reset_index(drop=True)
