@@ -55,12 +55,15 @@ STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "s
 def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
     """Make an empty pair list with room for ``capacity`` pairs."""
     return kernels.Pairs(
-        np.zeros(spheres, dtype=np.uint64),
-        np.zeros(spheres, dtype=np.uint64),
-        np.zeros(spheres, dtype=np.uint64),
-        np.empty(capacity, dtype=np.uint32),
-        np.empty((capacity, 2)),
-        np.zeros((capacity if frictional else 1, 3)),
+        first=np.zeros(spheres, dtype=np.uint64),
+        last=np.zeros(spheres, dtype=np.uint64),
+        neighbour=np.empty(capacity, dtype=np.uint32),
+        constants=np.empty((capacity, 2)),
+        spring=np.zeros((capacity if frictional else 1, 3)),
+        near_last=np.zeros(spheres, dtype=np.uint64),
+        near_neighbour=np.empty(capacity, dtype=np.uint32),
+        near_constants=np.empty((capacity, 2)),
+        near_pair=np.empty(capacity if frictional else 1, dtype=np.uint32),
     )
 
 
@@ -345,7 +348,7 @@ class Bed:
                 self.bounds, spheres, level, grid, self.length, self.skin, first, last, pairs.neighbour
             )
             if count <= pairs.neighbour.size // self.threads:
-                return pairs._replace(first=first, near=last.copy(), last=last)
+                return pairs._replace(first=first, last=last, near_last=last.copy())
             pairs = _no_pairs(0, int(1.3 * count) * self.threads, self.frictional)
 
     def _carry_springs(self, order: IntArray, pairs: kernels.Pairs) -> None:

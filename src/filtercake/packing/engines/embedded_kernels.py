@@ -31,26 +31,35 @@ class Grid(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Pairs by sphere: ``first[i]:last[i]`` are those of sphere i, near ones before ``near[i]``.
+    """Pairs by sphere, and apart from them, close together in memory, the near ones: the others cannot touch yet.
 
     Attributes
     ----------
-    first, near, last : ndarray, shape (n,)
-        Range of each sphere's pairs; those from ``near`` on cannot touch for some steps to come.
+    first, last : ndarray, shape (n,)
+        ``first[i]:last[i]`` are the pairs of sphere i.
     neighbour : ndarray, shape (m,)
         The other sphere, and in the upper bits a code of its periodic image.
     constants : ndarray, shape (m, 2)
         What of the contact law takes roots and does not change while the pair lasts.
     spring : ndarray, shape (m, 3)
         Tangential springs, m; one row without friction.
+    near_last : ndarray, shape (n,)
+        End of each sphere's near pairs; they begin where the sphere's before it end.
+    near_neighbour, near_constants : ndarray, shapes (m,), (m, 2)
+        As above, of the near pairs.
+    near_pair : ndarray, shape (m,)
+        Which pair a near one is, for its spring; one entry without friction.
     """
 
     first: Unsigned
-    near: Unsigned
     last: Unsigned
     neighbour: Neighbours
     constants: FloatArray
     spring: FloatArray
+    near_last: Unsigned
+    near_neighbour: Neighbours
+    near_constants: FloatArray
+    near_pair: Neighbours
 
 
 class Law(NamedTuple):
@@ -71,6 +80,8 @@ X, Y, Z, RADIUS, U, V, W, MASS = range(8)
 
 NEAR_STEPS = 20
 """Time steps that the choice of near pairs should last."""
+CLOSE_TO_LIMIT = 0.95
+"""Share of half a skin at which pairs are listed anew."""
 FUSED = {"contract"}
 """Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
 
@@ -266,30 +277,31 @@ def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _put_near_first(begin: int, end: int, state: FloatArray, pairs: Pairs, length: float, reach: float) -> None:
-    """Order the pairs of spheres ``begin`` to ``end`` so that those with gaps under ``reach`` (m) come first."""
-    first, near, last, neighbour, constants, spring = pairs
+def _pick_near(begin: int, end: int, state: FloatArray, pairs: Pairs, length: float, reach: float) -> None:
+    """Copy the pairs of spheres ``begin`` to ``end`` with gaps under ``reach`` (m) to the near ones."""
+    first, last, neighbour, constants, spring, near_last, near_neighbour, near_constants, near_pair = pairs
     frictional = spring.shape[0] == neighbour.size
+    if begin == end:
+        return
+    q = first[begin]
     for i in range(begin, end):
-        low, high = np.int64(first[i]), np.int64(last[i])
-        while low < high:
-            j = neighbour[low] & INDEX_MASK
-            code = np.int64(neighbour[low] >> IMAGE_SHIFT)
-            dx = state[i, X] - state[j, X] - (code % 3 - 1) * length
-            dy = state[i, Y] - state[j, Y] - (code // 3 - 1) * length
-            dz = state[i, Z] - state[j, Z]
-            touching = state[i, RADIUS] + state[j, RADIUS] + reach
+        x, y, z, r = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS] + reach
+        for p in range(first[i], last[i]):
+            j = neighbour[p] & INDEX_MASK
+            code = neighbour[p] >> IMAGE_SHIFT
+            dx, dy, dz = x - state[j, X], y - state[j, Y], z - state[j, Z]
+            if code != SAME_IMAGE:
+                dx -= (np.int64(code) % 3 - 1) * length
+                dy -= (np.int64(code) // 3 - 1) * length
+            touching = r + state[j, RADIUS]
             if dx * dx + dy * dy + dz * dz < touching * touching:
-                low += 1
-                continue
-            high -= 1
-            neighbour[low], neighbour[high] = neighbour[high], neighbour[low]
-            for k in range(2):
-                constants[low, k], constants[high, k] = constants[high, k], constants[low, k]
-            if frictional:
-                for k in range(3):
-                    spring[low, k], spring[high, k] = spring[high, k], spring[low, k]
-        near[i] = low
+                near_neighbour[q] = neighbour[p]
+                near_constants[q, STIFFNESS] = constants[p, STIFFNESS]
+                near_constants[q, DAMPING] = constants[p, DAMPING]
+                if frictional:
+                    near_pair[q] = p
+                q += np.uint64(1)
+        near_last[i] = q
 
 
 @njit(cache=True, error_model="numpy", fastmath=FUSED)
@@ -300,6 +312,16 @@ def _fastest(state: FloatArray, frame_speed: float) -> float:
         w = state[i, W] - frame_speed
         fastest = max(fastest, state[i, U] * state[i, U] + state[i, V] * state[i, V] + w * w)
     return math.sqrt(fastest)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FUSED)
+def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
+    """Return the largest distance from the reference in a frame that has risen by ``frame``, m."""
+    farthest = 0.0
+    for i in range(state.shape[0]):
+        x, y, z = state[i, X] - reference[i, 0], state[i, Y] - reference[i, 1], state[i, Z] - reference[i, 2] - frame
+        farthest = max(farthest, x * x + y * y + z * z)
+    return math.sqrt(farthest)
 
 
 @njit(cache=True, error_model="numpy", fastmath=FUSED)
@@ -332,17 +354,19 @@ def _make_pair_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
         spring_step: float,
     ) -> None:
         """Add the forces and torques of the pairs of spheres ``begin`` to ``end``; ``force`` has shape (n, 3)."""
-        first, near, neighbour = pairs.first, pairs.near, pairs.neighbour
-        constants, spring = pairs.constants, pairs.spring
+        last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
+        spring, pair = pairs.spring, pairs.near_pair
         lens_factor = 0.25 * math.pi * law.cohesion
+        stop = pairs.first[begin] if begin < end else np.uint64(0)
         for i in range(begin, end):
+            start, stop = stop, last[i]
             xi, yi, zi, ri = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
             ui, vi, wi = state[i, U], state[i, V], state[i, W]
             fx, fy, fz = 0.0, 0.0, 0.0
             tx, ty, tz = 0.0, 0.0, 0.0
-            for p in range(first[i], near[i]):
-                j = neighbour[p] & INDEX_MASK
-                code = neighbour[p] >> IMAGE_SHIFT
+            for q in range(start, stop):
+                j = neighbour[q] & INDEX_MASK
+                code = neighbour[q] >> IMAGE_SHIFT
                 dx, dy, dz = xi - state[j, X], yi - state[j, Y], zi - state[j, Z]
                 if code != SAME_IMAGE:
                     dx -= (np.int64(code) % 3 - 1) * length
@@ -352,7 +376,7 @@ def _make_pair_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
                 total = ri + rj
                 if square >= total * total:
                     if frictional:
-                        spring[p, 0] = spring[p, 1] = spring[p, 2] = 0.0
+                        spring[pair[q], 0] = spring[pair[q], 1] = spring[pair[q], 2] = 0.0
                     continue
                 r = math.sqrt(square)
                 inverse = 1.0 / r
@@ -361,7 +385,7 @@ def _make_pair_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
                 quarter = math.sqrt(root)
                 du, dv, dw = ui - state[j, U], vi - state[j, V], wi - state[j, W]
                 normal_speed = (du * dx + dv * dy + dw * dz) * inverse
-                normal = constants[p, STIFFNESS] * overlap * root - constants[p, DAMPING] * quarter * normal_speed
+                normal = constants[q, STIFFNESS] * overlap * root - constants[q, DAMPING] * quarter * normal_speed
                 push = normal
                 if cohesive:
                     lens = overlap * (total + r) * (square - (ri - rj) * (ri - rj))
@@ -377,17 +401,17 @@ def _make_pair_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
                     sx = du - normal_speed * nx - (nz * oy - ny * oz)
                     sy = dv - normal_speed * ny - (nx * oz - nz * ox)
                     sz = dw - normal_speed * nz - (ny * ox - nx * oy)
-                    hx = spring[p, 0] + sx * spring_step
-                    hy = spring[p, 1] + sy * spring_step
-                    hz = spring[p, 2] + sz * spring_step
+                    hx = spring[pair[q], 0] + sx * spring_step
+                    hy = spring[pair[q], 1] + sy * spring_step
+                    hz = spring[pair[q], 2] + sz * spring_step
                     along = hx * nx + hy * ny + hz * nz
-                    stiffness = law.shear_stiffness * constants[p, STIFFNESS] * root
+                    stiffness = law.shear_stiffness * constants[q, STIFFNESS] * root
                     hx, hy, hz, slides = _limit_spring(
                         hx - along * nx, hy - along * ny, hz - along * nz, stiffness, law.friction * abs(normal)
                     )
-                    drag = 0.0 if slides else law.shear_damping * constants[p, DAMPING] * quarter
+                    drag = 0.0 if slides else law.shear_damping * constants[q, DAMPING] * quarter
                     px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
-                    spring[p, 0], spring[p, 1], spring[p, 2] = hx, hy, hz
+                    spring[pair[q], 0], spring[pair[q], 1], spring[pair[q], 2] = hx, hy, hz
                     gx += px
                     gy += py
                     gz += pz
@@ -471,7 +495,7 @@ def _make_floor_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
 
 
 @cache
-def _make_move(frictional: bool) -> Callable[..., tuple[float, float]]:
+def _make_move(frictional: bool) -> Callable[..., float]:
     """Compile one step of the equations of motion."""
 
     @njit(cache=True, error_model="numpy", fastmath=FUSED)
@@ -482,43 +506,36 @@ def _make_move(frictional: bool) -> Callable[..., tuple[float, float]]:
         spin: FloatArray,
         force: FloatArray,
         torque: FloatArray,
-        reference: FloatArray,
         kick: float,
         time_step: float,
-        frame: float,
         frame_speed: float,
         gravity: float,
-    ) -> tuple[float, float]:
+    ) -> float:
         """Kick and move spheres ``begin`` to ``end``, and leave their weight in ``force`` for the next step to add to.
 
-        Returns the largest squared distance from their reference and the largest squared speed, in the frame.
+        Returns the largest squared speed in the frame.
         """
-        farthest, fastest = 0.0, 0.0
+        fastest = 0.0
         for i in range(begin, end):
             scale = kick / state[i, MASS]
             u = state[i, U] + scale * force[i, 0]
             v = state[i, V] + scale * force[i, 1]
             w = state[i, W] + scale * force[i, 2]
-            x = state[i, X] + time_step * u
-            y = state[i, Y] + time_step * v
-            z = state[i, Z] + time_step * w
             state[i, U], state[i, V], state[i, W] = u, v, w
-            state[i, X], state[i, Y], state[i, Z] = x, y, z
+            state[i, X] += time_step * u
+            state[i, Y] += time_step * v
+            state[i, Z] += time_step * w
             force[i, 0], force[i, 1], force[i, 2] = 0.0, 0.0, -gravity * state[i, MASS]
-            moved_x, moved_y, moved_z = x - reference[i, 0], y - reference[i, 1], z - reference[i, 2] - frame
-            away = moved_x * moved_x + moved_y * moved_y + moved_z * moved_z
             if frictional:
                 turn = scale / (0.4 * state[i, RADIUS] * state[i, RADIUS])
                 for k in range(3):
                     spin[i, k] += turn * torque[i, k]
                     torque[i, k] = 0.0
-            if not away <= farthest:  # keeps what is not a number, too
-                farthest = away
             rising = w - frame_speed
             fastest = max(fastest, u * u + v * v + rising * rising)
-        return farthest, fastest
+        return fastest
 
-    compiled: Callable[..., tuple[float, float]] = move
+    compiled: Callable[..., float] = move
     return compiled
 
 
@@ -567,7 +584,8 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
     ) -> tuple[int, bool, float]:
         """Advance up to ``steps``.
 
-        It stops early, forces unknown, when a sphere has moved by half a skin since the pairs were listed, or when
+        It stops early, forces unknown, when a sphere may have moved by half a skin since the pairs were listed (at
+        ``reference``; real distances are taken only when the sum of the largest speeds says so), or when
         one of the ``watched`` spheres, which have neighbours that are not in the list, has been touched. Movement
         is seen from a frame that has risen by ``frame`` and rises by ``frame_step`` per step: only relative
         movement opens or closes a pair. ``slack`` is the distance by which spheres may yet approach each other
@@ -584,8 +602,9 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
         n = state.shape[0]
         parts = bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
         done = 0
-        limit = 0.25 * skin * skin
-        drift, speed = np.zeros(parts), np.zeros(parts)
+        limit = 0.5 * skin
+        drift, speed = _farthest(state, reference, frame), np.zeros(parts)
+        near_enough = True
         frame_speed = frame_step / time_step
         if not ready:
             for t in prange(parts):
@@ -599,7 +618,7 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                 if slack < 0.0:
                     slack = min(2.0 * _fastest(state, frame_speed) * time_step * NEAR_STEPS, skin)
                     for t in prange(parts):
-                        _put_near_first(bounds[t], bounds[t + 1], state, pairs, length, slack)
+                        _pick_near(bounds[t], bounds[t + 1], state, pairs, length, slack)
                     if slack == skin:
                         slack = np.inf  # every pair is near
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
@@ -625,24 +644,27 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
             starting = False
             frame += frame_step
             for t in prange(parts):
-                drift[t], speed[t] = move(
+                speed[t] = move(
                     t * n // parts,
                     (t + 1) * n // parts,
                     state,
                     spin,
                     force[0],
                     torque[0],
-                    reference,
                     kick,
                     time_step,
-                    frame,
                     frame_speed,
                     law.gravity,
                 )
-            slack -= 2.0 * math.sqrt(speed.max()) * time_step
+            path = math.sqrt(speed.max()) * time_step
+            slack -= 2.0 * path
+            drift += path  # none has moved farther
+            if not drift < limit:
+                drift = _farthest(state, reference, frame)
+                near_enough = drift < CLOSE_TO_LIMIT * limit
             done += 1
             ready = False
-            if not max(drift.max(), frame * frame) < limit or _disturbed(state, watched):
+            if not near_enough or not abs(frame) < limit or _disturbed(state, watched):
                 return done, ready, slack
 
     compiled: Callable[..., tuple[int, bool, float]] = advance
