@@ -8,7 +8,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run test test-all lint format schemas figures regression speed growth agreement references resume retry lock setup clean help
+.PHONY: run test test-all lint format schemas figures regression speed growth agreement bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -54,6 +54,9 @@ growth: setup ## the embedded engine's time per sphere and step against N and si
 
 agreement: setup ## both engines on the same clouds, nine cases (about 45 min on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) agreement
+
+bed-size: setup ## several beds of N = 20 000 against one of N = 100 000, alum (about 10 min)
+	$(SNAKEMAKE) bed_size --config studies=alum,alum_full
 
 references: setup ## remake the stored LIGGGHTS trajectories that the tests compare the embedded engine with
 	$(BIN)/python tests/data/force_scenes.py

@@ -1,4 +1,4 @@
-"""Whether two packing engines make the same beds: mean porosities over ensembles, case by case.
+"""Whether two packing engines, or beds of two sizes, are the same: mean porosities over ensembles, case by case.
 
 Packings are chaotic: the same cloud settles to another bed with another rounding. Only ensembles can be compared.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from filtercake.study import SWEPT
+from filtercake.study import SWEPT, half_width
 
 STANDARD_ERRORS = 2.0
 """Combined standard errors within which two means agree."""
@@ -58,6 +58,47 @@ def compare_engines(replicates: pd.DataFrame, reference: str, other: str) -> pd.
                 "agree": sharp and abs(difference) <= STANDARD_ERRORS * error,
             }
         )
+    return pd.DataFrame(rows)
+
+
+def compare_sizes(small: pd.DataFrame, large: pd.DataFrame) -> pd.DataFrame:
+    """Hold the mean of a study's beds against one larger bed (or a few) of the same points.
+
+    Parameters
+    ----------
+    small, large : DataFrame
+        Rows of ``replicates.csv`` of both studies, of which points at the same distribution and material are compared.
+
+    Returns
+    -------
+    DataFrame
+        One row per point of ``large`` and porosity estimator: number of beds and of spheres of both, the means, the
+        half-width of the smaller beds' 95 % interval, the difference (large minus small), and whether it is
+        ``within`` that interval.
+    """
+    same = ["csd", *SWEPT]
+    rows = []
+    for case, beds in large[large["status"] == "ok"].groupby(same, sort=False):
+        here = (small[same] == list(case)).all(axis="columns") & (small["status"] == "ok")
+        for estimator in ("porosity", "porosity_as_published"):
+            ours, theirs = (table[estimator].to_numpy(np.float64) for table in (small[here], beds))
+            mean, half = float(ours.mean()), half_width(ours)
+            difference = float(theirs.mean()) - mean
+            rows.append(
+                {
+                    **dict(zip(same, case, strict=True)),
+                    "estimator": estimator,
+                    "n_small": ours.size,
+                    "particles_small": int(small.loc[here, "particles"].max()) if ours.size else 0,
+                    "mean_small": mean,
+                    "ci95_small": half,
+                    "n_large": theirs.size,
+                    "particles_large": int(beds["particles"].max()),
+                    "mean_large": float(theirs.mean()),
+                    "difference": difference,
+                    "within": abs(difference) <= half,
+                }
+            )
     return pd.DataFrame(rows)
 
 

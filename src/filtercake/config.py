@@ -281,7 +281,13 @@ class Published(Model):
 
     csd: Name = Field(description="Name of a distribution from csds.")
     quantity: Literal[
-        "porosity", "resistance_m_kg", "system_dimension_um", "smallest_um", "largest_um", "filter_area_m2"
+        "porosity",
+        "resistance_m_kg",
+        "system_dimension_um",
+        "smallest_um",
+        "largest_um",
+        "filter_area_m2",
+        "medium_share",
     ] = Field(description="What was published.")
     value: Number = Field(description="The value, in the unit its name says.")
     source: Annotated[str, Field(max_length=80)] = Field(description="Where it is from, for the legend.")

@@ -15,6 +15,7 @@ from filtercake.benchmark import Contender, warm_up
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.pack import settle
+from filtercake.packing.result import SettledState
 from filtercake.packing.spec import PackingSpec
 
 SMALLEST = 20e-6
@@ -55,6 +56,9 @@ def even_distribution(size_ratio: float) -> CrystalSizeDistribution:
 def time_growth(base: PackingSpec, cases: Iterable[Case], report: Report = lambda _: None) -> pd.DataFrame:
     """Time the whole settling of each case, on one core.
 
+    A machine's pace changes within minutes: the first case is timed anew before and after every other one, and
+    what a case costs is given relative to it.
+
     Parameters
     ----------
     base : PackingSpec
@@ -67,23 +71,36 @@ def time_growth(base: PackingSpec, cases: Iterable[Case], report: Report = lambd
     Returns
     -------
     DataFrame
-        Columns series, particles, size_ratio, steps, wall_s, ns_per_particle_step.
+        Columns series, particles, size_ratio, steps, wall_s, ns_per_particle_step, and reference_ns: that of the
+        first case, the mean of before and after.
     """
-    fraction = base.time_step / _rayleigh(base, 0.5 * SMALLEST)
-    rows = []
-    for case in cases:
-        csd = even_distribution(case.size_ratio)
-        step = fraction * _rayleigh(base, 0.5 * csd.smallest)
-        spec = replace(base, engine=Embedded.name, particles=case.particles, time_step=step, processes=1)
-        contender = Contender(Embedded.name, spec, Embedded())
-        warm_up(contender, csd)
-        with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
-            state = settle(spec, csd, 0, Path(folder), engine=contender.engine).state
-        pace = state.wall_time / state.steps / case.particles
-        row = {**vars(case), "steps": state.steps, "wall_s": state.wall_time, "ns_per_particle_step": 1e9 * pace}
-        report(f"N = {case.particles:,}, ratio {case.size_ratio:g}: {state.wall_time:.1f} s, {1e9 * pace:.1f} ns")
-        rows.append(row)
+    listed = list(cases)
+    rows: list[dict[str, object]] = []
+    before = _time(base, listed[0])[1]
+    for case in listed:
+        state, pace = _time(base, case)
+        after = _time(base, listed[0])[1]
+        row = {**vars(case), "steps": state.steps, "wall_s": state.wall_time, "ns_per_particle_step": pace}
+        rows.append({**row, "reference_ns": 0.5 * (before + after)})
+        report(
+            f"N = {case.particles:,}, ratio {case.size_ratio:g}: {state.wall_time:.1f} s, {pace:.1f} ns; "
+            f"the first case {before:.1f} ns before, {after:.1f} ns after"
+        )
+        before = after
     return pd.DataFrame(rows)
+
+
+def _time(base: PackingSpec, case: Case) -> tuple[SettledState, float]:
+    """Settle a bed; return what became of it, and its time per sphere and step, ns."""
+    csd = even_distribution(case.size_ratio)
+    fraction = base.time_step / _rayleigh(base, 0.5 * SMALLEST)
+    step = fraction * _rayleigh(base, 0.5 * csd.smallest)
+    spec = replace(base, engine=Embedded.name, particles=case.particles, time_step=step, processes=1)
+    contender = Contender(Embedded.name, spec, Embedded())
+    warm_up(contender, csd)
+    with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
+        state = settle(spec, csd, 0, Path(folder), engine=contender.engine).state
+    return state, 1e9 * state.wall_time / state.steps / case.particles
 
 
 def _rayleigh(spec: PackingSpec, radius: float) -> float:

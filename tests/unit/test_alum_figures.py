@@ -278,7 +278,8 @@ class TestResistanceAndArea:
         assert found == [pytest.approx(pair) for pair in zip(VOLUMES, values, strict=True)]
         areas = [(line.get_xdata()[0], line.get_ydata()[0]) for line in marked(filter_area, "published")]
         assert areas == [pytest.approx(pair) for pair in ((5.0, 3.4), (20.0, 2.9))]
-        assert not marked(share, "published")
+        shares = [(line.get_xdata()[0], line.get_ydata()[0]) for line in marked(share, "published")]
+        assert shares == [pytest.approx(pair) for pair in ((5.0, 50.0), (20.0, 60.0))]
 
     def test_failed_point_is_a_cross_and_a_single_packing_has_no_interval(self, failed: StudyData) -> None:
         figure = draw("fig14_resistance_area", failed)

@@ -45,6 +45,39 @@ rule compare_engines:
         "../scripts/agreement.py"
 
 
+# several beds held against one of the paper's own size; the studies must be among those asked for
+BED_SIZES = ["alum", "alum_full"]
+
+
+rule bed_size:
+    input:
+        expand("{results}/benchmark/bed_size.csv", results=RESULTS),
+    localrule: True
+
+
+rule compare_sizes:
+    input:
+        replicates=expand(
+            "{results}/{study}/replicates.csv", results=RESULTS, study=BED_SIZES
+        ),
+        library=library("agreement"),
+    output:
+        "{results}/benchmark/bed_size.csv",
+    log:
+        "{results}/benchmark/logs/bed_size.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/bed_size.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    message:
+        "comparing the sizes of beds"
+    script:
+        "../scripts/bed_size.py"
+
+
 # what is timed, each case's engines in turn; the first is the one to beat, with its authors' own settings
 SPEED = {
     "pmma": {

@@ -34,6 +34,7 @@ def draw(data: StudyData) -> Figure:
     _series(share, percent, "medium_share", ("medium_share_low", "medium_share_high"))
     published(resistance, data, table, "resistance_m_kg")
     published(area, data, table, "filter_area_m2")
+    published(share, data, table, "medium_share", scale=100.0)
     style.resistance_axis(resistance, table["resistance_m_kg"].to_numpy())
     resistance.set_ylabel(resistance.get_ylabel().replace("Specific cake", "Specific cake\n"))
     area.set_ylabel("Filter area (m²)")
@@ -47,14 +48,14 @@ def draw(data: StudyData) -> Figure:
     return figure
 
 
-def published(axes: Axes, data: StudyData, table: pd.DataFrame, quantity: str) -> None:
-    """Plot the published values of a quantity at the volumes of the products they belong to."""
+def published(axes: Axes, data: StudyData, table: pd.DataFrame, quantity: str, scale: float = 1.0) -> None:
+    """Plot the published values of a quantity, times ``scale``, at the volumes of the products they belong to."""
     for csd, volume in zip(table["csd"], table[VOLUME], strict=True):
         for value in selection.published(data, str(csd), quantity):
             if value.low is not None and value.high is not None:
-                style.published_range(axes, float(volume), value.low, value.high, colour=style.INK)
+                style.published_range(axes, float(volume), scale * value.low, scale * value.high, colour=style.INK)
             else:
-                style.published_point(axes, float(volume), value.value, value)
+                style.published_point(axes, float(volume), scale * value.value, value)
                 style.shift(axes.get_lines()[-1:], axes, ASIDE, 1)  # beside ours, which it would cover
 
 

@@ -49,7 +49,7 @@ STATE_ARRAYS = (
     "bounds",
     *SIZED_ARRAYS,
 )
-STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step", "slack")
+STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step")
 
 
 def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
@@ -63,7 +63,7 @@ def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
         near_last=np.zeros(spheres, dtype=np.uint64),
         near_neighbour=np.empty(capacity, dtype=np.uint32),
         near_constants=np.empty((capacity, 2)),
-        near_pair=np.empty(capacity if frictional else 1, dtype=np.uint32),
+        near_pair=np.empty(capacity, dtype=np.uint32),
     )
 
 
@@ -112,7 +112,7 @@ class Bed:
         self.watched = np.empty(0, dtype=np.int64)
         self.grounded = np.empty(0, dtype=np.int64)
         self.pairs = _no_pairs(0, 8 * n + 64 * threads, self.frictional)
-        self.skin, self.frame_step, self.slack = 0.0, 0.0, -1.0
+        self.skin, self.frame_step = 0.0, 0.0
         self.count = n
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
@@ -207,7 +207,7 @@ class Bed:
 
     def _run(self, steps: int) -> int:
         n = self.count
-        done, self.ready, self.slack = self.kernel(
+        done, self.ready = self.kernel(
             steps,
             self.ready,
             self.starting,
@@ -228,7 +228,6 @@ class Bed:
             self.skin,
             self.frame_step * (self.step - self.listed_at),
             self.frame_step,
-            self.slack,
         )
         self.starting = self.starting and done == 0
         self.listed = self.ready
@@ -322,19 +321,23 @@ class Bed:
         if not top < self.ceiling:
             raise EngineError("the bed exploded: spheres fly far above where they started; use a shorter time step")
         cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
-        order, start, shape, offset = kernels.sort_into_cells(
-            self.spheres[:n], self.level[:n], cell_size, self.length, max(top, 0.0)
-        )
+        top = max(top, 0.0)
+        order = kernels.sort_in_space(self.spheres[:n], float(self.largest[0]), self.length, top)
         for array in self._arrays():
             array[:n] = array[:n][order]
-        pairs = self._find_pairs(kernels.Grid(start, shape, offset, self.largest, cell_size))
+        spheres, level = self.spheres[:n], self.level[:n]
+        index, start, shape, offset = kernels.sort_into_cells(spheres, level, cell_size, self.length, top)
+        place = np.empty_like(index)
+        place[index] = np.arange(n)
+        grid = kernels.Grid(spheres[index, :4], index, place, start, shape, offset, self.largest, cell_size)
+        pairs = self._find_pairs(grid)
         kernels.pair_constants(self.spheres[:n], pairs, self.modulus, self.damping_ratio)
         if self.frictional:
             self._carry_springs(order, pairs)
         self.pairs = pairs
         self._share_work()
         self.reference[:n] = self.position[:n]
-        self.listed, self.listed_at, self.slack = True, self.step, -1.0
+        self.listed, self.listed_at = True, self.step
 
     def _find_pairs(self, grid: kernels.Grid) -> kernels.Pairs:
         n, capacity = self.count, self.pairs.neighbour.size
@@ -347,7 +350,7 @@ class Bed:
             count = self.find_pairs(
                 self.bounds, spheres, level, grid, self.length, self.skin, first, last, pairs.neighbour
             )
-            if count <= pairs.neighbour.size // self.threads:
+            if count < pairs.neighbour.size // self.threads:
                 return pairs._replace(first=first, last=last, near_last=last.copy())
             pairs = _no_pairs(0, int(1.3 * count) * self.threads, self.frictional)
 

@@ -21,8 +21,27 @@ Neighbours = np.ndarray[Any, np.dtype[np.uint32]]
 
 
 class Grid(NamedTuple):
-    """Cells of every size level: first sphere of each cell, cells per axis, first cell, largest radius, cell side."""
+    """Cells of every size level, and the spheres in the order of the cells.
 
+    Attributes
+    ----------
+    spheres : ndarray, shape (n, 4)
+        Position and radius, sorted by level and cell.
+    member : ndarray, shape (n,)
+        Where each of these stands in the bed.
+    place : ndarray, shape (n,)
+        The inverse: where each sphere of the bed stands here.
+    start : ndarray, shape (cells + 1,)
+        First sphere of each cell.
+    shape, offset : ndarray, shapes (levels, 3), (levels + 1,)
+        Cells per axis and first cell of each level.
+    largest, cell_size : ndarray, shape (levels,)
+        Largest radius and cell side of each level.
+    """
+
+    spheres: FloatArray
+    member: IntArray
+    place: IntArray
     start: IntArray
     shape: IntArray
     offset: IntArray
@@ -48,7 +67,7 @@ class Pairs(NamedTuple):
     near_neighbour, near_constants : ndarray, shapes (m,), (m, 2)
         As above, of the near pairs.
     near_pair : ndarray, shape (m,)
-        Which pair a near one is, for its spring; one entry without friction.
+        Which pair a near one is.
     """
 
     first: Unsigned
@@ -79,7 +98,13 @@ class Law(NamedTuple):
 X, Y, Z, RADIUS, U, V, W, MASS = range(8)
 
 NEAR_STEPS = 20
-"""Time steps that the choice of near pairs should last."""
+"""Time steps that the choice of near pairs lasts, unless a sphere becomes too fast for it."""
+PATCH_SHIFT = 6
+PATCH = 2**PATCH_SHIFT
+"""Spheres, next to each other in memory and in space, that share a frame and a limit of speed."""
+OWN_ROOM = 1.5
+COMMON_ROOM = 0.1
+"""Limit of a patch's speeds: so many times its fastest sphere's, and so many times that of the whole bed's."""
 CLOSE_TO_LIMIT = 0.95
 """Share of half a skin at which pairs are listed anew."""
 FUSED = {"contract"}
@@ -93,6 +118,46 @@ SAME_IMAGE = np.uint32(4)
 
 # columns of a pair's constants
 STIFFNESS, DAMPING = range(2)
+
+
+@njit(cache=True)
+def sort_in_space(state: FloatArray, side: float, length: float, top: float) -> IntArray:
+    """Order in which spheres of any size that are close in space are close in memory: layers of rows of small cubes.
+
+    Parameters
+    ----------
+    state : ndarray, shape (n, 8)
+        Spheres; x and y in [0, length).
+    side : float
+        Side of the cubes.
+    length, top : float
+        Box side and greatest height of a centre.
+    """
+    n = state.shape[0]
+    across = max(1, int(length / side))
+    layers = max(1, int(top / side) + 1)
+    cell = np.empty(n, dtype=np.int64)
+    start = np.zeros(across * across * layers + 1, dtype=np.int64)
+    for i in range(n):
+        cx = min(int(state[i, X] / length * across), across - 1)
+        cy = min(int(state[i, Y] / length * across), across - 1)
+        cz = min(max(int(state[i, Z] / side), 0), layers - 1)
+        cell[i] = (cz * across + cy) * across + cx
+        start[cell[i] + 1] += 1
+    return _by_cell(cell, start)
+
+
+@njit(cache=True)
+def _by_cell(cell: IntArray, start: IntArray) -> IntArray:
+    """Order by cell; ``start`` holds how many each cell has, one place further, and becomes each cell's first."""
+    for c in range(start.size - 1):
+        start[c + 1] += start[c]
+    fill = start[:-1].copy()
+    order = np.empty(cell.size, dtype=np.int64)
+    for i in range(cell.size):
+        order[fill[cell[i]]] = i
+        fill[cell[i]] += 1
+    return order
 
 
 @njit(cache=True)
@@ -136,17 +201,10 @@ def sort_into_cells(
         cz = min(max(int(state[i, Z] / cell_size[k]), 0), shape[k, 2] - 1)
         cell[i] = offset[k] + (cz * across + cy) * across + cx
         start[cell[i] + 1] += 1
-    for c in range(offset[levels]):
-        start[c + 1] += start[c]
-    fill = start[:-1].copy()
-    order = np.empty(n, dtype=np.int64)
-    for i in range(n):
-        order[fill[cell[i]]] = i
-        fill[cell[i]] += 1
-    return order, start, shape, offset
+    return _by_cell(cell, start), start, shape, offset
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=FUSED)
 def _find_pairs(
     part: int,
     bounds: IntArray,
@@ -160,9 +218,10 @@ def _find_pairs(
     neighbour: Neighbours,
 ) -> int:
     """List the pairs of one part's spheres in its share of the list; return how many they are."""
-    start, shape, offset, largest, cell_size = grid
+    spheres, member, place, start = grid.spheres, grid.member, grid.place, grid.start
+    shape, offset, largest, cell_size = grid.shape, grid.offset, grid.largest, grid.cell_size
     room = neighbour.size // (bounds.size - 1)
-    begin_at = part * room
+    begin_at, last_slot = part * room, room - 1
     count = 0
     for i in range(bounds[part], bounds[part + 1]):
         first[i] = begin_at + count
@@ -186,23 +245,20 @@ def _find_pairs(
                     wrap_y = -1 if cy < 0 else (1 if cy >= across else 0)
                     ys = y - wrap_y * length
                     row = offset[k] + (cz * across + cy - wrap_y * across) * across
-                    for cx in range(x0, x1 + 1):
-                        wrap_x = -1 if cx < 0 else (1 if cx >= across else 0)
+                    for wrap_x in range(-1 if x0 < 0 else 0, 2 if x1 >= across else 1):
+                        # the cells of one image in a row lie one behind the other, and so do their spheres
+                        left, right = max(x0, wrap_x * across), min(x1, wrap_x * across + across - 1)
                         xs = x - wrap_x * length
-                        c = row + cx - wrap_x * across
-                        begin = start[c]
+                        begin, end = start[row + left - wrap_x * across], start[row + right - wrap_x * across + 1]
                         if k == own:
-                            begin = max(begin, i + 1)  # each pair once
-                        for j in range(begin, start[c + 1]):
-                            dx = xs - state[j, X]
-                            dy = ys - state[j, Y]
-                            dz = z - state[j, Z]
-                            near = r + state[j, RADIUS] + skin
-                            if dx * dx + dy * dy + dz * dz < near * near:
-                                if count < room:
-                                    code = np.uint32((wrap_y + 1) * 3 + wrap_x + 1)
-                                    neighbour[begin_at + count] = np.uint32(j) | (code << IMAGE_SHIFT)
-                                count += 1
+                            begin = max(begin, place[i] + 1)  # each pair once
+                        code = np.uint32((wrap_y + 1) * 3 + wrap_x + 1) << IMAGE_SHIFT
+                        for j in range(np.uint64(begin), np.uint64(end)):
+                            dx, dy, dz = xs - spheres[j, X], ys - spheres[j, Y], z - spheres[j, Z]
+                            near = r + spheres[j, RADIUS] + skin
+                            # written in any case and kept if near: a branch here is too often guessed wrongly
+                            neighbour[begin_at + min(count, last_slot)] = np.uint32(member[j]) | code
+                            count += dx * dx + dy * dy + dz * dz < near * near
         last[i] = begin_at + count
     return count
 
@@ -277,15 +333,49 @@ def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _pick_near(begin: int, end: int, state: FloatArray, pairs: Pairs, length: float, reach: float) -> None:
-    """Copy the pairs of spheres ``begin`` to ``end`` with gaps under ``reach`` (m) to the near ones."""
-    first, last, neighbour, constants, spring, near_last, near_neighbour, near_constants, near_pair = pairs
-    frictional = spring.shape[0] == neighbour.size
+def _limit_speeds(state: FloatArray, patch_speed: FloatArray, patch_limit: FloatArray) -> None:
+    """Give every patch of spheres a vertical speed of its own, and the speed relative to it that none may exceed."""
+    n = state.shape[0]
+    fastest = 0.0
+    for b in range(patch_speed.size):
+        begin, end = b * PATCH, min(b * PATCH + PATCH, n)
+        mean = 0.0
+        for i in range(begin, end):
+            mean += state[i, W]
+        mean /= end - begin
+        largest = 0.0
+        for i in range(begin, end):
+            w = state[i, W] - mean
+            largest = max(largest, state[i, U] * state[i, U] + state[i, V] * state[i, V] + w * w)
+        patch_speed[b] = mean
+        patch_limit[b] = math.sqrt(largest)
+        fastest = max(fastest, patch_limit[b])
+    for b in range(patch_speed.size):
+        patch_limit[b] = OWN_ROOM * patch_limit[b] + COMMON_ROOM * fastest
+
+
+@njit(cache=True, error_model="numpy", fastmath=FUSED)
+def _pick_near(
+    begin: int,
+    end: int,
+    state: FloatArray,
+    pairs: Pairs,
+    patch_speed: FloatArray,
+    patch_limit: FloatArray,
+    length: float,
+    duration: float,
+) -> None:
+    """Copy the pairs of spheres ``begin`` to ``end`` that may touch within ``duration`` (s) to the near ones."""
+    first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
+    near_last, near_neighbour = pairs.near_last, pairs.near_neighbour
+    near_constants, near_pair = pairs.near_constants, pairs.near_pair
     if begin == end:
         return
     q = first[begin]
     for i in range(begin, end):
-        x, y, z, r = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS] + reach
+        x, y, z = state[i, X], state[i, Y], state[i, Z]
+        own_speed = patch_speed[i // PATCH]
+        r = state[i, RADIUS] + duration * patch_limit[i // PATCH]
         for p in range(first[i], last[i]):
             j = neighbour[p] & INDEX_MASK
             code = neighbour[p] >> IMAGE_SHIFT
@@ -293,25 +383,17 @@ def _pick_near(begin: int, end: int, state: FloatArray, pairs: Pairs, length: fl
             if code != SAME_IMAGE:
                 dx -= (np.int64(code) % 3 - 1) * length
                 dy -= (np.int64(code) // 3 - 1) * length
-            touching = r + state[j, RADIUS]
-            if dx * dx + dy * dy + dz * dz < touching * touching:
-                near_neighbour[q] = neighbour[p]
-                near_constants[q, STIFFNESS] = constants[p, STIFFNESS]
-                near_constants[q, DAMPING] = constants[p, DAMPING]
-                if frictional:
-                    near_pair[q] = p
-                q += np.uint64(1)
+            patch = j >> PATCH_SHIFT
+            approach = patch_limit[patch] + abs(own_speed - patch_speed[patch])
+            touching = r + state[j, RADIUS] + duration * approach
+            # written in any case and kept if near: a branch here is too often guessed wrongly
+            near_pair[q] = p
+            q += np.uint64(dx * dx + dy * dy + dz * dz < touching * touching)
         near_last[i] = q
-
-
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _fastest(state: FloatArray, frame_speed: float) -> float:
-    """Return the largest speed in a frame that rises with ``frame_speed``, m/s."""
-    fastest = 0.0
-    for i in range(state.shape[0]):
-        w = state[i, W] - frame_speed
-        fastest = max(fastest, state[i, U] * state[i, U] + state[i, V] * state[i, V] + w * w)
-    return math.sqrt(fastest)
+    for k in range(first[begin], q):
+        near_neighbour[k] = neighbour[near_pair[k]]
+        near_constants[k, STIFFNESS] = constants[near_pair[k], STIFFNESS]
+        near_constants[k, DAMPING] = constants[near_pair[k], DAMPING]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FUSED)
@@ -495,7 +577,7 @@ def _make_floor_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
 
 
 @cache
-def _make_move(frictional: bool) -> Callable[..., float]:
+def _make_move(frictional: bool) -> Callable[..., tuple[float, bool]]:
     """Compile one step of the equations of motion."""
 
     @njit(cache=True, error_model="numpy", fastmath=FUSED)
@@ -506,17 +588,20 @@ def _make_move(frictional: bool) -> Callable[..., float]:
         spin: FloatArray,
         force: FloatArray,
         torque: FloatArray,
+        patch_speed: FloatArray,
+        patch_limit: FloatArray,
         kick: float,
         time_step: float,
         frame_speed: float,
         gravity: float,
-    ) -> float:
+    ) -> tuple[float, bool]:
         """Kick and move spheres ``begin`` to ``end``, and leave their weight in ``force`` for the next step to add to.
 
-        Returns the largest squared speed in the frame.
+        Returns the largest squared speed in the frame, and whether a sphere was faster than its patch may be.
         """
-        fastest = 0.0
+        fastest, too_fast = 0.0, False
         for i in range(begin, end):
+            patch = i // PATCH
             scale = kick / state[i, MASS]
             u = state[i, U] + scale * force[i, 0]
             v = state[i, V] + scale * force[i, 1]
@@ -531,11 +616,13 @@ def _make_move(frictional: bool) -> Callable[..., float]:
                 for k in range(3):
                     spin[i, k] += turn * torque[i, k]
                     torque[i, k] = 0.0
-            rising = w - frame_speed
-            fastest = max(fastest, u * u + v * v + rising * rising)
-        return fastest
+            sideways = u * u + v * v
+            rising, own = w - frame_speed, w - patch_speed[patch]
+            fastest = max(fastest, sideways + rising * rising)
+            too_fast |= sideways + own * own > patch_limit[patch] * patch_limit[patch]
+        return fastest, too_fast
 
-    compiled: Callable[..., float] = move
+    compiled: Callable[..., tuple[float, bool]] = move
     return compiled
 
 
@@ -549,7 +636,7 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 
 
 @cache
-def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool, float]]:
+def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
     A threaded loop gives each thread a share of the pairs and a force buffer of its own.
@@ -580,16 +667,14 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
         skin: float,
         frame: float,
         frame_step: float,
-        slack: float,
-    ) -> tuple[int, bool, float]:
+    ) -> tuple[int, bool]:
         """Advance up to ``steps``.
 
         It stops early, forces unknown, when a sphere may have moved by half a skin since the pairs were listed (at
         ``reference``; real distances are taken only when the sum of the largest speeds says so), or when
         one of the ``watched`` spheres, which have neighbours that are not in the list, has been touched. Movement
         is seen from a frame that has risen by ``frame`` and rises by ``frame_step`` per step: only relative
-        movement opens or closes a pair. ``slack`` is the distance by which spheres may yet approach each other
-        before pairs that are not near may touch; below 0 they are told apart anew.
+        movement opens or closes a pair.
 
         ``force`` and ``torque`` have one layer per thread, shape (threads, n, 3); the first ends as the total.
         ``bounds`` (threads + 1,) are the spheres whose pairs each thread works on, ``grounded`` the spheres that
@@ -597,13 +682,16 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
 
         Returns
         -------
-        Steps done, whether the forces at the new positions are known, and the slack that is left.
+        Steps done, and whether the forces at the new positions are known.
         """
         n = state.shape[0]
         parts = bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
         done = 0
         limit = 0.5 * skin
-        drift, speed = _farthest(state, reference, frame), np.zeros(parts)
+        drift, speed, too_fast = _farthest(state, reference, frame), np.zeros(parts), np.zeros(parts, dtype=np.bool_)
+        patches = (n + PATCH - 1) // PATCH
+        patch_speed, patch_limit = np.zeros(patches), np.full(patches, np.inf)
+        picked = 0  # steps that the choice of near pairs will last yet
         near_enough = True
         frame_speed = frame_step / time_step
         if not ready:
@@ -615,12 +703,12 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                         torque[t, i, 0] = torque[t, i, 1] = torque[t, i, 2] = 0.0
         while True:
             if not ready:
-                if slack < 0.0:
-                    slack = min(2.0 * _fastest(state, frame_speed) * time_step * NEAR_STEPS, skin)
+                if picked == 0:
+                    _limit_speeds(state, patch_speed, patch_limit)
+                    duration = NEAR_STEPS * time_step
                     for t in prange(parts):
-                        _pick_near(bounds[t], bounds[t + 1], state, pairs, length, slack)
-                    if slack == skin:
-                        slack = np.inf  # every pair is near
+                        _pick_near(bounds[t], bounds[t + 1], state, pairs, patch_speed, patch_limit, length, duration)
+                    picked = NEAR_STEPS
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
                     pair_forces(
@@ -639,25 +727,27 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                 floor_forces(grounded, state, spin, force[0], torque[0], floor, floor_spring, law, spring_step)
                 ready = True
             if done == steps:
-                return done, ready, slack
+                return done, ready
             kick = 0.5 * time_step if starting else time_step
             starting = False
             frame += frame_step
             for t in prange(parts):
-                speed[t] = move(
+                speed[t], too_fast[t] = move(
                     t * n // parts,
                     (t + 1) * n // parts,
                     state,
                     spin,
                     force[0],
                     torque[0],
+                    patch_speed,
+                    patch_limit,
                     kick,
                     time_step,
                     frame_speed,
                     law.gravity,
                 )
             path = math.sqrt(speed.max()) * time_step
-            slack -= 2.0 * path
+            picked = 0 if too_fast.any() else max(picked - 1, 0)
             drift += path  # none has moved farther
             if not drift < limit:
                 drift = _farthest(state, reference, frame)
@@ -665,7 +755,7 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
             done += 1
             ready = False
             if not near_enough or not abs(frame) < limit or _disturbed(state, watched):
-                return done, ready, slack
+                return done, ready
 
-    compiled: Callable[..., tuple[int, bool, float]] = advance
+    compiled: Callable[..., tuple[int, bool]] = advance
     return compiled

@@ -1,0 +1,15 @@
+"""Rule compare_sizes: mean porosities of several beds and of one larger bed."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.agreement import compare_sizes
+from filtercake.job import job
+from filtercake.packing.result import publish
+
+with job(snakemake.log[0]) as log:
+    table = compare_sizes(*(pd.read_csv(path) for path in snakemake.input.replicates))
+    log.info("\n%s", table.to_string())
+    with publish(Path(snakemake.output[0])) as temporary:
+        table.to_csv(temporary, index=False)
