@@ -318,6 +318,7 @@ def _point(
     spec = PackingSpec(
         particles=settings.particles,
         void_fraction=settings.void_fraction,
+        column_ratio=settings.column_ratio,
         settling_velocity=settings.settling_velocity_m_s,
         density=material.density,
         youngs_modulus=modulus,
@@ -345,7 +346,8 @@ def _slug(csd_name: str, swept: dict[str, float], study: Study, spec: PackingSpe
     for name, short in (("poisson_ratio", "nu"), ("restitution", "e"), ("youngs_modulus_MPa", "E")):
         if swept[name] != getattr(study.material, name):
             parts.append(f"{short}{swept[name]:g}")
-    decisive = {key: value for key, value in asdict(spec).items() if key not in ("time_limit", "write_vtk")}
+    idle = {"time_limit", "write_vtk"} | ({"column_ratio"} if spec.column_ratio == 1.0 else set())
+    decisive = {key: value for key, value in asdict(spec).items() if key not in idle}
     code = digest(decisive, csd.size.tolist(), csd.volume_fraction.tolist())[:8]
     return re.sub(r"[^A-Za-z0-9_.-]", "-", "_".join([*parts, code]))
 

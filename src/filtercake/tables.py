@@ -49,8 +49,8 @@ def table1(study: Study, csds: Csds) -> pd.DataFrame:
         published = published_value(study, name, "system_dimension_um", "simulation")
         particles = published.particles if published and published.particles else study.packing.particles
         length, same = (
-            box_length(truncated, n, study.packing.void_fraction) / MICROMETRE
-            for n in (study.packing.particles, particles)
+            box_length(truncated, n, study.packing.void_fraction, ratio) / MICROMETRE
+            for n, ratio in ((study.packing.particles, study.packing.column_ratio), (particles, 1.0))
         )
         rows.append(
             {

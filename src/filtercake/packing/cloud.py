@@ -64,8 +64,8 @@ class Cloud:
         return 1.0 - solids / (self.length**2 * self.height)
 
 
-def box_length(csd: CrystalSizeDistribution, particles: int, void_fraction: float) -> float:
-    """System dimension L, m: ``(N <V> / ((1 - e0) 2))^(1/3)`` (paper, Table 1).
+def box_length(csd: CrystalSizeDistribution, particles: int, void_fraction: float, column_ratio: float = 1.0) -> float:
+    """System dimension L, m: ``(N <V> / ((1 - e0) 2 c))^(1/3)`` (paper, Table 1, with c = 1).
 
     Parameters
     ----------
@@ -74,13 +74,17 @@ def box_length(csd: CrystalSizeDistribution, particles: int, void_fraction: floa
     particles : int
         Number of spheres N.
     void_fraction : float
-        Initial void fraction e0 of the region 0..2L.
+        Initial void fraction e0 of the region 0..2cL.
+    column_ratio : float
+        How many times deeper than the paper's the bed is, in units of its box side: c.
     """
     solids = particles * csd.mean_particle_volume
-    return float((solids / ((1.0 - void_fraction) * PLACEMENT_HEIGHT)) ** (1.0 / 3.0))
+    return float((solids / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * column_ratio)) ** (1.0 / 3.0))
 
 
-def make_cloud(csd: CrystalSizeDistribution, particles: int, void_fraction: float, seed: int) -> Cloud:
+def make_cloud(
+    csd: CrystalSizeDistribution, particles: int, void_fraction: float, seed: int, column_ratio: float = 1.0
+) -> Cloud:
     """Place N spheres by random sequential addition, large ones first, with exact class counts.
 
     Parameters
@@ -90,9 +94,11 @@ def make_cloud(csd: CrystalSizeDistribution, particles: int, void_fraction: floa
     particles : int
         Number of spheres; class counts follow by largest remainder.
     void_fraction : float
-        Initial void fraction of the region 0..2L; 0.65, or 0.60 for broad distributions.
+        Initial void fraction of the region 0..2cL; 0.65, or 0.60 for broad distributions.
     seed : int
         Seed of the random stream; the same seed gives the same cloud on every machine.
+    column_ratio : float
+        c, as in :func:`box_length`.
 
     Raises
     ------
@@ -103,13 +109,13 @@ def make_cloud(csd: CrystalSizeDistribution, particles: int, void_fraction: floa
         raise CloudError("the cloud holds no sphere; particles must be at least 1")
     counts = csd.class_counts(particles)
     radius = np.repeat(0.5 * csd.size[::-1], counts[::-1])
-    length = box_length(csd, particles, void_fraction)
+    length = box_length(csd, particles, void_fraction, column_ratio)
     if 2.0 * radius[0] > length:
         raise CloudError(
             f"the largest sphere ({2.0 * radius[0] / MICROMETRE:.4g} um) is wider than the periodic box "
             f"({length / MICROMETRE:.4g} um); use more particles than {particles}"
         )
-    height = PLACEMENT_HEIGHT * length
+    height = PLACEMENT_HEIGHT * column_ratio * length
     position = np.empty((particles, 3))
     rng = np.random.Generator(np.random.PCG64(seed))
     level, cells = _grid_levels(radius, length, height)

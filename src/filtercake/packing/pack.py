@@ -148,7 +148,7 @@ def settle(
         If the spheres cannot be placed, or the engine fails.
     """
     seed = cloud_seed(spec, csd, replicate)
-    cloud = make_cloud(csd, spec.particles, spec.void_fraction, seed)
+    cloud = make_cloud(csd, spec.particles, spec.void_fraction, seed, spec.column_ratio)
     rule = StopRule.for_bed(spec, cloud.length)
     request = SettleRequest(spec, csd, cloud, rule, stage_seed(seed, "engine"), folder, progress, state_file)
     return Settled((engine or get_engine(spec.engine)).settle(request), cloud, rule, seed)

@@ -75,7 +75,7 @@ class StopRule:
     @classmethod
     def for_bed(cls, spec: PackingSpec, length: float) -> StopRule:
         """Scale the rule to a box of side ``length`` (m)."""
-        fall_time = spec.free_fall_time(PLACEMENT_HEIGHT * length)
+        fall_time = spec.free_fall_time(PLACEMENT_HEIGHT * spec.column_ratio * length)
         check_steps = max(1, round(fall_time / CHECKS_PER_FALL / spec.time_step))
         return cls(
             check_steps=check_steps,

@@ -49,6 +49,8 @@ class PackingSpec:
         MPI processes for one packing; 0 lets the engine choose by size.
     time_limit : float
         Wall-clock limit of one packing, s; 0 for none.
+    column_ratio : float
+        How many times deeper than the paper's the bed is, in units of its box side.
     write_vtk : bool
         Whether to keep pictures of the settling for ParaView.
     """
@@ -70,6 +72,7 @@ class PackingSpec:
     skin: float = 0.0
     processes: int = 0
     time_limit: float = 0.0
+    column_ratio: float = 1.0
     write_vtk: bool = False
 
     @classmethod
