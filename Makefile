@@ -2,13 +2,14 @@
 VENV ?= .venv
 CORES ?= 2
 STUDIES ?=
+CALIBRATION ?= pmma
 BIN := $(VENV)/bin
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run test test-all lint format schemas figures regression speed growth agreement bed-size references resume retry lock setup clean help
+.PHONY: run calibrate test test-all lint format schemas figures regression speed growth agreement bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -39,6 +40,9 @@ format: setup ## format the code
 
 schemas: setup ## regenerate the JSON schemas and the reference of config keys
 	$(BIN)/python -m filtercake.schema
+
+calibrate: setup ## fit the cohesion to measured resistances (CALIBRATION=name of a file in config/calibrations)
+	$(SNAKEMAKE) calibrate --config calibrations=$(CALIBRATION)
 
 figures: setup ## redraw the figures
 	$(SNAKEMAKE) $(CONFIG) --forcerun figure

@@ -198,6 +198,13 @@ class Packing(Model):
     void_fraction: Annotated[float, Field(ge=0.5, le=0.95, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.65, description="Void fraction of the initial cloud; 0.65, or 0.60 for broad distributions."
     )
+    column_ratio: Annotated[float, Field(ge=0.5, le=10, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=1.0,
+        description=(
+            "Depth of the bed in units of its box side, over the paper's: fewer spheres make a bed as deep as a wider "
+            "one's."
+        ),
+    )
     settling_velocity_m_s: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.01, description="Initial downward speed of the spheres, m/s."
     )
@@ -232,6 +239,12 @@ class Packing(Model):
         default=240.0, description="Wall-clock limit of one packing, min."
     )
     write_vtk: bool = Field(default=False, description="Keep pictures of the settling for ParaView.")
+
+    @model_validator(mode="after")
+    def _as_published(self) -> Packing:
+        if self.engine == "liggghts_as_published" and self.column_ratio != 1.0:
+            raise ValueError("the engine liggghts_as_published has the paper's own box: column_ratio must be 1")
+        return self
 
     def time_step(self, rayleigh: float, friction: float) -> float:
         """Time step, s, from the Rayleigh time step (s) and the friction of a scene."""
@@ -326,5 +339,8 @@ class Workflow(Model):
 
     studies: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
         default=["pmma"], description="Names of files in config/studies, or paths of study files."
+    )
+    calibrations: Annotated[list[str], BeforeValidator(_listed)] = Field(
+        default=[], description="Names of files in config/calibrations, or paths of calibration files."
     )
     results: Annotated[str, Field(min_length=1)] = Field(default="results", description="Folder of the results.")

@@ -98,10 +98,10 @@ def load_workflow(values: dict[str, Any], file: str) -> Workflow:
     ConfigError
         With every problem.
     """
-    studies = values.get("studies")
-    if isinstance(studies, str):  # --config studies=a,b
-        values = {**values, "studies": [name.strip() for name in studies.split(",") if name.strip()]}
-    return _parse(Workflow, values, file)
+    for key in ("studies", "calibrations"):
+        if isinstance(values.get(key), str):  # --config studies=a,b
+            values = {**values, key: [name.strip() for name in values[key].split(",") if name.strip()]}
+    return parse(Workflow, values, file)
 
 
 def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
@@ -139,7 +139,7 @@ def load_study(path: Path) -> LoadedStudy:
     ConfigError
         With every problem found in the file and the files it names.
     """
-    model = _parse(Study, read_yaml(path), str(path))
+    model = parse(Study, read_yaml(path), str(path))
     model, kinetics = _resolve_crystallizer(model, path)
     problems = list(_reference_problems(model, str(path)))
     csds: dict[str, LoadedCsd] = {}
@@ -223,7 +223,23 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _parse(model: type[M], values: Any, file: str) -> M:
+def parse(model: type[M], values: Any, file: str) -> M:
+    """Check the values of a YAML file against its model.
+
+    Parameters
+    ----------
+    model : type of BaseModel
+        What the file must be.
+    values : Any
+        What :func:`read_yaml` returned.
+    file : str
+        Its name, for messages.
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+    """
     if not isinstance(values, dict):
         raise ConfigError([Problem(file, "(file)", _shown(values), "must be a mapping of keys to values")])
     try:
@@ -334,7 +350,9 @@ def _kinetics(crystallizer: Crystallizer, path: Path) -> Kinetics:
         own = load_kinetics(path.parent / crystallizer.kinetics_file) if crystallizer.kinetics_file else None
         return get_kinetics(crystallizer.kinetics, own)
     except CrystallizerError as error:
-        raise ConfigError([Problem(str(path), "crystallizer.kinetics", crystallizer.kinetics, str(error))]) from None
+        asked = repr(crystallizer.kinetics)
+        allowed = str(error).removeprefix(f"kinetics = {asked}: ")
+        raise ConfigError([Problem(str(path), "crystallizer.kinetics", asked, allowed)]) from None
 
 
 def _source_of(name: str, csd: Csd) -> tuple[str, str]:

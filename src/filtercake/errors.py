@@ -84,3 +84,11 @@ class CrystallizerError(FiltercakeError):
 
 class FilterError(FiltercakeError):
     """A drum filter, or a cake on it, has a value that makes no sense."""
+
+
+class CalibrationError(FiltercakeError):
+    """A calibration has too little to go on."""
+
+
+class FiltrationError(FiltercakeError):
+    """A filtration test cannot be read or fitted."""

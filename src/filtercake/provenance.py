@@ -15,7 +15,7 @@ from filtercake.packing.result import sha256
 from filtercake.packing.spec import digest
 
 ROOT = Path(__file__).resolve().parent
-PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "jinja2", "pydantic", "snakemake")
+PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "scikit-learn", "jinja2", "pydantic", "snakemake")
 
 
 @cache

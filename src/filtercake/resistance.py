@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from scipy import optimize
+
 from filtercake.csd import CrystalSizeDistribution
 
 KOZENY_CARMAN = 180.0
@@ -45,6 +47,28 @@ def carman_sauter(porosity: float, csd: CrystalSizeDistribution, density: float,
 def log_sensitivity(porosity: float) -> float:
     """Relative change of the resistance per unit of porosity, ``d ln(alpha) / d eps``; about -10 at 0.36."""
     return -1.0 / (1.0 - porosity) - 3.0 / porosity
+
+
+def implied_porosity(resistance: float, csd: CrystalSizeDistribution, density: float, sphericity: float = 1.0) -> float:
+    """Porosity at which :func:`kozeny_carman` gives a resistance (m/kg): the one that a measurement implies.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+    """
+    if not (resistance > 0.0 and math.isfinite(resistance)):
+        raise ValueError(f"resistance {resistance:g} m/kg is not positive")
+    at_half = kozeny_carman(0.5, csd, density, sphericity)
+    # (1 - eps)/eps^3 falls from infinity to 0: one root, found in ln(eps/(1 - eps)) where it is nowhere steep
+    ratio = math.log(resistance / at_half)
+
+    def excess(odds: float) -> float:
+        porosity = 1.0 / (1.0 + math.exp(-odds))
+        return math.log((1.0 - porosity) / porosity**3) - math.log(4.0) - ratio
+
+    root = float(optimize.brentq(excess, -30.0, 30.0, xtol=1e-14))
+    return 1.0 / (1.0 + math.exp(-root))
 
 
 def _prefactor(porosity: float, density: float, sphericity: float) -> float:

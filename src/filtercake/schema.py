@@ -14,7 +14,9 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from filtercake.calibration_config import Calibration, CohesionRange
 from filtercake.config import Crystallizer, Csd, Filter, Material, Packing, Published, SizeClass, Study, Sweep, Workflow
+from filtercake.measurements import ConstantPressureTest, KnownResistance, MeasurementFile
 
 EXAMPLES = {
     "kinetics": "ammonium_alum",
@@ -39,6 +41,8 @@ def generated() -> dict[Path, str]:
     return {
         Path("workflow/schemas/study.schema.json"): _schema(Study),
         Path("workflow/schemas/workflow.schema.json"): _schema(Workflow),
+        Path("workflow/schemas/calibration.schema.json"): _schema(Calibration),
+        Path("workflow/schemas/measurements.schema.json"): _schema(MeasurementFile),
         Path("config/template.yaml"): study_template(),
         Path("docs/config-reference.md"): reference(),
     }
@@ -108,6 +112,11 @@ def reference() -> str:
         ("`packing`", Packing),
         ("`sweeps[]`", Sweep),
         ("`published[]`", Published),
+        ("A calibration: `config/calibrations/<name>.yaml`", Calibration),
+        ("`cohesion_kJ_m3` of a calibration", CohesionRange),
+        ("Measurements: `config/measurements/<name>.yaml`", MeasurementFile),
+        ("`tests[]`", ConstantPressureTest),
+        ("`resistances[]`", KnownResistance),
     ]
     for title, model in parts:
         lines += ["", f"## {title}", "", str(model.__doc__ or "").strip(), ""]

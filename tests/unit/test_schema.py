@@ -7,10 +7,14 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from filtercake.calibration_config import load_calibration
 from filtercake.config_loading import load_study, load_workflow, read_yaml
 from filtercake.schema import ROOT, generated, write
 
-STUDIES = sorted([*(ROOT / "config").glob("*/*.yaml"), ROOT / "config" / "template.yaml"])
+FOLDERS = ("studies", "benchmarks", "test")
+STUDIES = [path for folder in FOLDERS for path in sorted((ROOT / "config" / folder).glob("*.yaml"))]
+STUDIES.append(ROOT / "config" / "template.yaml")
+CALIBRATIONS = sorted((ROOT / "config" / "calibrations").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("path", generated(), ids=str)
@@ -31,6 +35,15 @@ def test_shipped_studies_follow_schema_and_model(path):
     jsonschema.validate(read_yaml(path), schema)
     study = load_study(path)
     assert study.model.sweeps and study.csds
+
+
+@pytest.mark.parametrize("path", CALIBRATIONS, ids=lambda path: path.name)
+def test_shipped_calibrations_follow_schema_and_model(path):
+    calibration = load_calibration(path, ROOT / "config" / "studies")
+    for name, file in (("calibration", path), ("measurements", calibration.measurements.files[0])):
+        schema = json.loads((ROOT / f"workflow/schemas/{name}.schema.json").read_text())
+        jsonschema.validate(read_yaml(file), schema)
+    assert calibration.measured and calibration.frictions
 
 
 def test_the_schema_refuses_what_the_model_refuses():

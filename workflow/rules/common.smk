@@ -6,12 +6,19 @@ import time
 from pathlib import Path
 
 from filtercake import console, engine_choice
+from filtercake.calibration_config import (
+    candidates as calibration_candidates,
+    load_calibrations,
+    observations_of,
+    settings_of,
+)
 from filtercake.config_loading import find_studies, load_studies, load_workflow
 from filtercake.errors import FiltercakeError
-from filtercake.figures import catalogue
+from filtercake.figures import calibrated, catalogue
 from filtercake.job import PROGRESS_VARIABLE, Progress
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
+from filtercake.packing.result import read_record
 from filtercake.provenance import packing_sources, sources
 from filtercake.study import expand as expand_points, with_engine
 from filtercake.units import MICROMETRE
@@ -43,7 +50,13 @@ try:
         )
     }
     POINTS = points_by_name(STUDIES)
-    engine_choice.check(STUDIES.values())
+    CALIBRATIONS = load_calibrations(
+        settings.calibrations,
+        ROOT / "config" / "calibrations",
+        ROOT / "config" / "studies",
+        CONFIG_FILE,
+    )
+    engine_choice.check([*STUDIES.values(), *(item.study for item in CALIBRATIONS)])
 except FiltercakeError as error:
     stop(error)
 

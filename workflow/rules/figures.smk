@@ -20,6 +20,8 @@ rule figure:
         "{results}/{study}/logs/figures/{figure}.log",
     benchmark:
         "{results}/{study}/benchmarks/figures/{figure}.tsv"
+    wildcard_constraints:
+        figure="|".join(catalogue.FIGURES),
     conda:
         "../envs/filtercake.yaml"
     resources:

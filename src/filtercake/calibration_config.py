@@ -1,0 +1,334 @@
+"""The file that describes a calibration, and everything it refers to, checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from filtercake import contact
+from filtercake.calibration import Observation, Parameter, advised_friction
+from filtercake.calibration_study import BATCHES, Candidate, Settings
+from filtercake.config import (
+    DOUBTFUL_RELATIVE_OVERLAP,
+    LARGEST_RELATIVE_OVERLAP,
+    NAME,
+    TO_NUMBER,
+    TO_WHOLE,
+    Cohesion,
+    EngineName,
+    Friction,
+    Model,
+    Name,
+    Sweep,
+    Workflow,
+)
+from filtercake.config_loading import LoadedStudy, find_studies, load_study, parse, read_yaml
+from filtercake.csd import CrystalSizeDistribution
+from filtercake.errors import ConfigError, Problem
+from filtercake.measurements import Measurements, load_measurements
+from filtercake.resistance import implied_porosity
+from filtercake.study import expand
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL
+
+ChooseEngine = Callable[[CrystalSizeDistribution, int], str]
+
+
+class CohesionRange(Model):
+    """Where the cohesion is looked for."""
+
+    low: Cohesion = Field(default=0.0, description="Lowest cohesion energy density, kJ/m3.")
+    high: Cohesion = Field(default=100.0, description="Highest cohesion energy density, kJ/m3.")
+    step: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=5.0, description="Packings are made at multiples of this from low on, kJ/m3."
+    )
+
+    @model_validator(mode="after")
+    def _ascending(self) -> CohesionRange:
+        if not self.low < self.high:
+            raise ValueError("low must be below high")
+        if not 2 <= (self.high - self.low) / self.step <= 200:
+            raise ValueError("step must divide the range into 2 to 200 parts")
+        return self
+
+    def values(self) -> list[float]:
+        """Return the cohesions at which packings may be made, kJ/m3."""
+        count = round((self.high - self.low) / self.step)
+        return [float(f"{value:.10g}") for value in np.linspace(self.low, self.high, count + 1)]
+
+
+class Calibration(Model):
+    """What is fitted to which measurements."""
+
+    title: Annotated[str, Field(max_length=120)] = Field(default="", description="One line for figures.")
+    study: str = Field(description="Study whose distributions, material and packing settings hold: a name or a path.")
+    measurements: str = Field(description="YAML with the measurements; path relative to this file.")
+    cohesion_kJ_m3: CohesionRange = Field(  # noqa: N815
+        default=CohesionRange(), description="Where the cohesion is looked for."
+    )
+    friction: Friction | Literal["advised"] = Field(
+        default="advised",
+        description="Coefficient of friction; advised takes none where the measured resistances imply a mean porosity "
+        "under 0.4, and 0.05 above.",
+    )
+    fit_friction: Annotated[list[Friction], Field(min_length=3)] | None = Field(
+        default=None, description="Fit the friction too, with packings at these values (at least 3)."
+    )
+    rival_friction: list[Friction] = Field(
+        default=[], description="Other fixed frictions for which the cohesion is fitted too, to compare."
+    )
+    estimator: Literal["interior", "as_published"] = Field(
+        default="interior",
+        description="Porosity that the measured resistance is held against: the interior slab's, or the paper's count.",
+    )
+    engine: EngineName | None = Field(default=None, description="Packing engine; the study's if left out.")
+    replicates: Annotated[int, Field(ge=2, le=1000), TO_WHOLE] = Field(
+        default=6, description="Packings per point and batch."
+    )
+    rounds: Annotated[int, Field(ge=1, le=10), TO_WHOLE] = Field(
+        default=4, description="At most so many rounds of packings; later ones are made near the optimum."
+    )
+    target_interval: Annotated[float, Field(gt=0, lt=10, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=0.1, description="Half-width of the cohesion's 95 % interval, over its value, that ends the rounds."
+    )
+    predict: list[Name] = Field(
+        default=[], description="Distributions of the study, never tested, whose resistance is predicted."
+    )
+
+    @model_validator(mode="after")
+    def _one_friction(self) -> Calibration:
+        if self.fit_friction is not None and (self.rival_friction or self.friction != "advised"):
+            raise ValueError("fit_friction goes without friction and rival_friction")
+        if self.fit_friction is not None and sorted(set(self.fit_friction)) != list(self.fit_friction):
+            raise ValueError("fit_friction must be ascending, every value once")
+        return self
+
+
+@dataclass(frozen=True)
+class LoadedCalibration:
+    """A calibration whose every value has been checked.
+
+    Attributes
+    ----------
+    name : str
+        The file's stem.
+    path : Path
+        The file.
+    model : Calibration
+        Its contents.
+    study : LoadedStudy
+        The study, under the calibration's name and with its replicates.
+    measurements : Measurements
+        What was measured.
+    implied_porosity : float
+        Mean porosity that the measured resistances imply.
+    frictions : tuple of float
+        Those packed: one and its rivals, or all that the fit of the friction needs.
+    warnings : tuple of str
+        What is allowed but doubtful.
+    """
+
+    name: str
+    path: Path
+    model: Calibration
+    study: LoadedStudy
+    measurements: Measurements
+    implied_porosity: float
+    frictions: tuple[float, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The fitted parameters."""
+        cohesion = self.model.cohesion_kJ_m3
+        found = (Parameter("cohesion_kJ_m3", cohesion.low, cohesion.high),)
+        if self.model.fit_friction is None:
+            return found
+        return (*found, Parameter("friction", self.frictions[0], self.frictions[-1]))
+
+    @property
+    def packed(self) -> tuple[str, ...]:
+        """Distributions that packings are made of: the measured ones, then those to predict."""
+        return (*self.measured, *(name for name in self.model.predict if name not in self.measured))
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Distributions that were measured, in the study's order."""
+        names = {item.csd for item in self.measurements.measurements}
+        return tuple(name for name in self.study.csds if name in names)
+
+
+def load_calibrations(names: Iterable[str], folder: Path, studies: Path, file: str) -> list[LoadedCalibration]:
+    """Load calibrations by name (in ``folder``) or path.
+
+    Raises
+    ------
+    ConfigError
+        With every problem of every file.
+    """
+    problems: list[Problem] = []
+    loaded: list[LoadedCalibration] = []
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    for index, name in enumerate(names):
+        path = Path(name) if name.endswith((".yaml", ".yml")) else folder / f"{name}.yaml"
+        if not NAME.match(path.stem) or not path.is_file():
+            allowed = f"no such calibration; allowed: {', '.join(known)}, or the path of a calibration file"
+            problems.append(Problem(file, f"calibrations[{index}]", repr(name), allowed))
+            continue
+        try:
+            loaded.append(load_calibration(path, studies))
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    return loaded
+
+
+def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
+    """Read and check a calibration, its study and its measurements.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    studies : Path
+        Folder where studies are looked up by name.
+
+    Raises
+    ------
+    ConfigError
+        With every problem found.
+    """
+    model = parse(Calibration, read_yaml(path), str(path))
+    study = load_study(_study_path(model, path, studies))
+    measurements = load_measurements(path.parent / model.measurements)
+    problems = list(_problems(model, study, measurements, path))
+    if problems:
+        raise ConfigError(problems)
+    porosity = _implied_porosity(study, measurements)
+    name = f"calibration_{path.stem}"
+    asked = {"replicates": model.replicates, "engine": model.engine or study.model.packing.engine}
+    packing = study.model.packing.model_copy(update=asked)
+    own = study.model.model_copy(update={"packing": packing, "sweeps": []})
+    return LoadedCalibration(
+        name=name,
+        path=path,
+        model=model,
+        study=replace(study, name=name, model=own),
+        measurements=measurements,
+        implied_porosity=porosity,
+        frictions=_frictions(model, porosity),
+        warnings=(*measurements.warnings, *_doubts(model, study, path)),
+    )
+
+
+def candidates(calibration: LoadedCalibration, choose_engine: ChooseEngine) -> list[Candidate]:
+    """List every point that a calibration may come to need.
+
+    A batch of more replicates is the same point with another base seed.
+    """
+    found: list[Candidate] = []
+    sweep = Sweep(
+        csd=list(calibration.packed),
+        cohesion_kJ_m3=calibration.model.cohesion_kJ_m3.values(),
+        friction=list(calibration.frictions),
+    )
+    for batch in range(BATCHES):
+        packing = calibration.study.model.packing
+        packing = packing.model_copy(update={"seed": packing.seed + batch})
+        model = calibration.study.model.model_copy(update={"packing": packing, "sweeps": [sweep]})
+        points = expand(replace(calibration.study, model=model), choose_engine)
+        found += [Candidate(point, batch) for point in points]
+    return found
+
+
+def settings_of(calibration: LoadedCalibration) -> Settings:
+    """Return what the calibration's jobs need to know."""
+    model, material = calibration.model, calibration.study.model.material
+    return Settings(
+        parameters=calibration.parameters,
+        frictions=calibration.frictions,
+        measured=calibration.measured,
+        predicted=tuple(model.predict),
+        cohesions=tuple(model.cohesion_kJ_m3.values()),
+        estimator=model.estimator,
+        rounds=model.rounds,
+        target_interval=model.target_interval,
+        density=material.density,
+        sphericity=material.sphericity,
+        implied_porosity=calibration.implied_porosity,
+        soft_above=_cohesion_at(DOUBTFUL_RELATIVE_OVERLAP, calibration.study),
+    )
+
+
+def observations_of(calibration: LoadedCalibration) -> list[Observation]:
+    """Return the measurements as the fit takes them."""
+    return [
+        Observation(item.name, item.csd, math.log(item.resistance), item.relative_se)
+        for item in calibration.measurements.measurements
+    ]
+
+
+def _study_path(model: Calibration, path: Path, studies: Path) -> Path:
+    near = path.parent / model.study
+    if model.study.endswith((".yaml", ".yml")) and near.is_file():
+        return near
+    try:
+        return find_studies(Workflow(studies=[model.study]), studies, str(path))[0]
+    except ConfigError as error:
+        raise ConfigError([replace(problem, key="study") for problem in error.problems]) from None
+
+
+def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements, path: Path) -> Iterable[Problem]:
+    known = ", ".join(study.csds)
+    for item in measurements.measurements:
+        if item.csd not in study.csds:
+            yield Problem(
+                model.measurements, f"csd of {item.name}", repr(item.csd), f"not in the study; allowed: {known}"
+            )
+    for index, name in enumerate(model.predict):
+        if name not in study.csds:
+            yield Problem(str(path), f"predict[{index}]", repr(name), f"not in the study; allowed: {known}")
+    limit = _cohesion_at(LARGEST_RELATIVE_OVERLAP, study)
+    if model.cohesion_kJ_m3.high > limit:
+        text = f"must be at most {int(limit)} kJ/m3 at the study's Young's modulus: above it contacts are too soft"
+        yield Problem(str(path), "cohesion_kJ_m3.high", f"{model.cohesion_kJ_m3.high:g}", text)
+
+
+def _doubts(model: Calibration, study: LoadedStudy, path: Path) -> Iterable[str]:
+    limit = _cohesion_at(DOUBTFUL_RELATIVE_OVERLAP, study)
+    if model.cohesion_kJ_m3.high > limit:
+        yield (
+            f"{path}: above {limit:.0f} kJ/m3 contacts overlap by more than {DOUBTFUL_RELATIVE_OVERLAP:.0%} of the "
+            "diameter: the answer depends on their softness there"
+        )
+
+
+def _cohesion_at(overlap: float, study: LoadedStudy) -> float:
+    material = study.model.material
+    modulus = material.youngs_modulus_MPa * MEGAPASCAL
+    return contact.cohesion_at_overlap(overlap, modulus, material.poisson_ratio) / KILOJOULE_PER_M3
+
+
+def _implied_porosity(study: LoadedStudy, measurements: Measurements) -> float:
+    material = study.model.material
+    return float(
+        np.mean(
+            [
+                implied_porosity(item.resistance, study.csds[item.csd].full, material.density, material.sphericity)
+                for item in measurements.measurements
+            ]
+        )
+    )
+
+
+def _frictions(model: Calibration, porosity: float) -> tuple[float, ...]:
+    if model.fit_friction is not None:
+        return tuple(model.fit_friction)
+    main = advised_friction(porosity) if model.friction == "advised" else model.friction
+    return (main, *dict.fromkeys(value for value in model.rival_friction if value != main))

@@ -1,0 +1,250 @@
+"""Which figures a calibration has, what they show, and how one is drawn.
+
+A new figure is one module with ``draw(data) -> Figure`` and one line in ``CALIBRATION_FIGURES``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from filtercake.calibration import CONFIDENCE
+from filtercake.measurements import Measurements, compressibility_by_csd
+from filtercake.study import half_width
+
+if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
+    from matplotlib.figure import Figure
+
+Z = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE))
+"""Standard errors from an estimate to the end of its 95 % interval."""
+ESTIMATORS = {"interior": "interior porosity", "as_published": "porosity counted as in the paper"}
+"""Names of estimators for readers; one that is not listed keeps its own."""
+
+
+@dataclass(frozen=True)
+class CalibrationData:
+    """Everything a figure may show of a calibration.
+
+    Attributes
+    ----------
+    name, title : str
+        The calibration, and one line about it.
+    summary : dict
+        The outcome (see :func:`filtercake.calibration_study.summary`).
+    parity, objective, response : DataFrame
+        Its tables (see :mod:`filtercake.calibration_study`).
+    simulated : DataFrame
+        Every packing made (see :func:`filtercake.calibration_study.simulate`).
+    predictions : DataFrame or None
+        Predicted resistances, where any were asked for.
+    labels : dict of str to str
+        Names of the distributions for readers; their order chooses colours and markers.
+    measurements : Measurements or None
+        What was measured, for the figures of the tests.
+    """
+
+    name: str
+    title: str
+    summary: dict[str, Any]
+    parity: pd.DataFrame
+    objective: pd.DataFrame
+    response: pd.DataFrame
+    simulated: pd.DataFrame
+    predictions: pd.DataFrame | None
+    labels: dict[str, str]
+    measurements: Measurements | None = None
+
+    @property
+    def measured(self) -> list[str]:
+        """Distributions with measurements, in the order of the labels."""
+        names = {str(csd) for csd in self.parity["csd"]}
+        return sorted(names, key=self.number)
+
+    @property
+    def fits_friction(self) -> bool:
+        """Whether the friction was fitted."""
+        return self.summary["friction"] is None
+
+    @property
+    def friction(self) -> float:
+        """Coefficient of friction: the one taken, or the best one."""
+        return self.estimate("friction")[0] if self.fits_friction else float(self.summary["friction"])
+
+    @property
+    def cohesion(self) -> tuple[float, float, float]:
+        """Best cohesion and the ends of its 95 % interval, kJ/m3."""
+        return self.estimate("cohesion_kJ_m3")
+
+    def estimate(self, parameter: str) -> tuple[float, float, float]:
+        """Best value of a fitted parameter and the ends of its 95 % interval."""
+        found = self.summary["parameters"][parameter]
+        return float(found["value"]), float(found["low"]), float(found["high"])
+
+    def number(self, csd: str) -> int:
+        """Place of a distribution: it has the same colour in every figure."""
+        known = list(self.labels)
+        return known.index(csd) if csd in known else len(known)
+
+    def label(self, csd: str, characters: int = 40) -> str:
+        """Name of a distribution for readers, in lines of so many characters."""
+        return textwrap.fill(self.labels.get(csd) or csd, characters)
+
+
+@dataclass(frozen=True)
+class CalibrationFigure:
+    """A figure's module below ``filtercake.figures``, and what gives it something to show.
+
+    Attributes
+    ----------
+    module : str
+        Its module.
+    needs : {"", "predictions", "tests", "pressures"}
+        What a calibration must have: predictions, filtration tests, or resistances at several pressures.
+    """
+
+    module: str
+    needs: str = ""
+
+    @property
+    def of_tests(self) -> bool:
+        """Whether it is drawn from the measurements alone."""
+        return self.needs in ("tests", "pressures")
+
+
+CALIBRATION_FIGURES: dict[str, CalibrationFigure] = {
+    "calibration_objective": CalibrationFigure("calibration_objective"),
+    "calibration_parity": CalibrationFigure("calibration_parity"),
+    "calibration_resistance": CalibrationFigure("calibration_resistance"),
+    "calibration_predictions": CalibrationFigure("calibration_predictions", "predictions"),
+    "filtration_fits": CalibrationFigure("filtration_fits", "tests"),
+    "compressibility": CalibrationFigure("compressibility", "pressures"),
+}
+
+
+def figures_of(predicts: bool, measurements: Measurements | None = None) -> list[str]:
+    """Names of the figures a calibration has."""
+    has = {"": True, "predictions": predicts}
+    if measurements is not None:
+        has |= {"tests": bool(measurements.tests), "pressures": bool(compressibility_by_csd(measurements))}
+    return [name for name, figure in CALIBRATION_FIGURES.items() if has.get(figure.needs, False)]
+
+
+def module_of(figure: str) -> str:
+    """Library module behind a figure, below ``filtercake``."""
+    return f"figures.{CALIBRATION_FIGURES[figure].module}"
+
+
+def draw(figure: str, data: CalibrationData) -> Figure:
+    """Draw a figure."""
+    from filtercake.figures import style
+
+    module = importlib.import_module(f"filtercake.{module_of(figure)}")
+    with style.applied():
+        drawn: Figure = module.draw(data.measurements if CALIBRATION_FIGURES[figure].of_tests else data)
+    return drawn
+
+
+def measured_means(data: CalibrationData) -> pd.DataFrame:
+    """Average the measurements of each distribution as the fit does: csd, measured_m_kg and the 95 % interval's ends.
+
+    The column left_out_m_kg is the resistance that the other distributions' measurements predict; nan where none do.
+    """
+    rows = []
+    for csd in data.measured:
+        own = data.parity[data.parity["csd"] == csd]
+        weight = own["relative_uncertainty"].to_numpy(np.float64) ** -2
+        mean = float(np.average(np.log(own["measured_m_kg"].to_numpy(np.float64)), weights=weight))
+        reach = Z / math.sqrt(float(weight.sum()))
+        row = {"csd": csd, "measured_m_kg": math.exp(mean), "modelled_m_kg": float(own["modelled_m_kg"].iloc[0])}
+        row |= {"measured_low_m_kg": math.exp(mean - reach), "measured_high_m_kg": math.exp(mean + reach)}
+        rows.append({**row, "left_out_m_kg": math.exp(mean + float(own["left_out_ln_error"].iloc[0]))})
+    return pd.DataFrame(rows)
+
+
+def packed_friction(data: CalibrationData) -> float:
+    """Coefficient of friction of packings that is nearest to the one taken or fitted."""
+    packed = data.simulated["friction"].to_numpy(np.float64)
+    return float(packed[np.argmin(np.abs(packed - data.friction))])
+
+
+def packed_at(data: CalibrationData, csd: str, friction: float) -> pd.DataFrame:
+    """Average the accepted packings of a distribution and a friction by cohesion, all batches together.
+
+    Returns
+    -------
+    DataFrame
+        cohesion_kJ_m3, resistance_m_kg and resistance_ci95_m_kg; nan where no packing was accepted.
+    """
+    own = data.simulated[(data.simulated["csd"] == csd) & np.isclose(data.simulated["friction"], friction)]
+    rows = []
+    for cohesion, group in own.groupby("cohesion_kJ_m3"):
+        values = np.exp(group.loc[group["status"] == "ok", "ln_resistance"].to_numpy(np.float64))
+        mean = float(values.mean()) if values.size else math.nan
+        rows.append(
+            {"cohesion_kJ_m3": cohesion, "resistance_m_kg": mean, "resistance_ci95_m_kg": half_width(values)},
+        )
+    return pd.DataFrame(rows, columns=["cohesion_kJ_m3", "resistance_m_kg", "resistance_ci95_m_kg"])
+
+
+def main_packings(data: CalibrationData, csds: Sequence[str]) -> pd.DataFrame:
+    """Packings of some distributions without those of rival frictions."""
+    rows = data.simulated[data.simulated["csd"].isin(csds)]
+    return rows if data.fits_friction else rows[np.isclose(rows["friction"], data.friction)]
+
+
+def fitted_packings(data: CalibrationData, *, rivals: bool = False) -> pd.DataFrame:
+    """Packings of the measured distributions behind the fit, and behind those of rival frictions too if asked for."""
+    if rivals:
+        return data.simulated[data.simulated["csd"].isin(data.measured)]
+    return main_packings(data, data.measured)
+
+
+def count(rows: pd.DataFrame) -> str:
+    """Count packings, accepted and failed."""
+    good = int((rows["status"] == "ok").sum())
+    return f"{good} packing{'' if good == 1 else 's'}, {len(rows) - good or 'none'} failed"
+
+
+def footer(figure: Figure, data: CalibrationData, packings: Sequence[str], engines: Iterable[str], *notes: str) -> None:
+    """Say below a figure what was fitted to what, by how many packings of which engine.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    data : CalibrationData
+        What it shows.
+    packings : sequence of str
+        Packings in words (see :func:`count`).
+    engines : iterable of str
+        Engine of each.
+    *notes : str
+        What else there is to say.
+    """
+    from filtercake.figures import style
+
+    estimator = ESTIMATORS.get(data.summary["estimator"], data.summary["estimator"])
+    what = "cohesion and friction fitted" if data.fits_friction else f"cohesion fitted at friction {data.friction:g}"
+    names = ", ".join(style.ENGINES.get(name, name) for name in sorted({str(engine) for engine in engines}))
+    style.footer(figure, pd.DataFrame(), f"{what}, resistances from the {estimator}", *packings, names, *notes)
+
+
+def panel_title(data: CalibrationData, characters: int) -> str:
+    """Return the calibration's title in lines of so many characters."""
+    return textwrap.fill(data.title, characters)
+
+
+def with_interval(value: float, low: float, high: float, unit: str = "") -> str:
+    """Write a value and its interval, as precisely as the interval is wide."""
+    half = 0.5 * (high - low)
+    digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 3
+    best, *ends = (f"{round(number, digits) + 0.0:.{digits}f}" for number in (value, low, high))
+    return f"{best}{unit} (95 %: {ends[0]} to {ends[1]})"

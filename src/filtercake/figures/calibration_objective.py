@@ -1,0 +1,199 @@
+"""How well each cohesion (and friction) describes the measurements, and what must be known of the answer."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+from scipy import stats
+
+from filtercake.calibration import CONFIDENCE
+from filtercake.figures import calibrated, style
+from filtercake.units import FloatArray
+
+if TYPE_CHECKING:
+    from filtercake.figures.calibrated import CalibrationData
+
+THRESHOLD = float(stats.chi2.ppf(CONFIDENCE, 1))
+"""Deviance up to which a value belongs to the 95 % interval of one parameter."""
+LEAST_HEIGHT, MOST_HEIGHT = 6.0, 20.0
+"""Deviances at the top of the axes: the threshold is always seen, and so is the minimum."""
+LEVELS = (0.0, 1.0, 2.0, THRESHOLD, 6.0, 10.0, 15.0, MOST_HEIGHT)
+DEVIANCE = "Deviance above the minimum (–)"
+CHARACTERS = {False: 84, True: 66}
+"""Of a line of findings, without and with a scale of colours beside the axes."""
+LINE_HEIGHT = 0.135
+"""Of a line of findings, in."""
+
+
+def draw(data: CalibrationData) -> Figure:
+    """Draw the deviance against the cohesion, or over cohesion and friction, with the 95 % interval or region."""
+    findings = _findings(data)
+    height = 4.3 if data.fits_friction else 3.9
+    figure, (axes,) = style.panels(width=style.MEDIUM, height=height + LINE_HEIGHT * len(findings))
+    axes.set_title(calibrated.panel_title(data, 75), loc="left")
+    axes.set_xlabel(style.COHESION)
+    (_contours if data.fits_friction else _curves)(axes, data)
+    style.legend(figure, [axes], columns=1)
+    _say(axes, findings)
+    rows = calibrated.fitted_packings(data, rivals=True)
+    notes = ["deviance: −2 ln(likelihood)", _squares(data)]
+    if len(data.summary["rivals"]) > 1:
+        notes.append("each curve less its own minimum, which is marked")
+    calibrated.footer(figure, data, [calibrated.count(rows)], rows["engine"], *notes)
+    return figure
+
+
+def _curves(axes: Axes, data: CalibrationData) -> None:
+    frictions = data.objective["friction"].to_numpy(np.float64)
+    # the one taken is in front of its rivals, and the first of the legend
+    ranked = sorted(dict.fromkeys(frictions.tolist()), key=lambda mu: not np.isclose(mu, data.friction))
+    for index, mu in enumerate(ranked):
+        rows = data.objective[np.isclose(frictions, mu)]
+        cohesion, deviance = (rows[name].to_numpy(np.float64) for name in ("cohesion_kJ_m3", "deviance"))
+        main, ink = index == 0, style.colour(index)
+        axes.plot(
+            cohesion,
+            deviance,
+            color=ink,
+            linewidth=1.6 if main else 1.0,
+            linestyle="-" if main else (0, (5, 1.5)),
+            label=_label(data, mu),
+            zorder=3.0 - 0.1 * index,
+            gid="deviance",
+        )
+        if not main:
+            best = data.summary["rivals"][f"{mu:g}"]["cohesion_kJ_m3"]
+            axes.plot([best], [0.0], style.marker(index), color=ink, clip_on=False, zorder=4, gid="rival")
+    words = calibrated.with_interval(*data.cohesion, unit=" kJ/m³")
+    axes.plot(
+        [data.cohesion[0]],
+        [0.0],
+        style.marker(0),
+        color=style.colour(0),
+        markeredgecolor=style.INK,
+        markersize=6.0,
+        clip_on=False,
+        label=f"best cohesion: {words}",
+        zorder=5,
+        gid="best",
+    )
+    _interval(axes, data)
+    axes.axhline(
+        THRESHOLD,
+        color=style.INK,
+        linewidth=0.9,
+        linestyle=(0, (1, 1.5)),
+        label=f"95 % threshold of one parameter ({THRESHOLD:.2f})",
+        gid="threshold",
+    )
+    highest = float(data.objective["deviance"].max())
+    axes.set_ylim(0.0, min(max(1.05 * highest, LEAST_HEIGHT), MOST_HEIGHT))
+    axes.set_xlim(float(data.objective["cohesion_kJ_m3"].min()), float(data.objective["cohesion_kJ_m3"].max()))
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axes.set_ylabel(DEVIANCE)
+
+
+def _label(data: CalibrationData, mu: float) -> str:
+    rivals = data.summary["rivals"]
+    chosen = " (taken)" if len(rivals) > 1 and np.isclose(mu, data.friction) else ""
+    return f"friction {mu:g}{chosen}: χ² = {rivals[f'{mu:g}']['chi_square']:.1f}"
+
+
+def _squares(data: CalibrationData) -> str:
+    freedom = max(data.summary["degrees_of_freedom"], 0)
+    value = f"χ² = {data.summary['chi_square']:.1f}" if data.fits_friction else "χ²"
+    return f"{value} with {freedom or 'no'} degree{'s' if freedom > 1 else ''} of freedom"
+
+
+def _interval(axes: Axes, data: CalibrationData) -> None:
+    """Shade the cohesions in the 95 % interval, each of its stretches on its own."""
+    rows = data.objective[np.isclose(data.objective["friction"], data.friction)]
+    ends = stretches(rows["cohesion_kJ_m3"].to_numpy(np.float64), rows["deviance"].to_numpy(np.float64))
+    look: dict[str, Any] = {"color": style.colour(0), "alpha": 0.13, "linewidth": 0.0, "zorder": 0}
+    for low, high in ends:
+        axes.axvspan(low, high, label="95 % interval", gid="interval", **look)
+
+
+def stretches(values: FloatArray, deviance: FloatArray) -> list[tuple[float, float]]:
+    """Find where a deviance on a grid is under the threshold: the ends of every stretch, ascending."""
+    excess = deviance - THRESHOLD
+    inside = np.concatenate([[False], excess <= 0.0, [False]])
+    first, last = np.flatnonzero(~inside[:-1] & inside[1:]), np.flatnonzero(inside[:-1] & ~inside[1:]) - 1
+
+    def crossing(within: int, beyond: int) -> float:
+        if not 0 <= beyond < values.size:
+            return float(values[within])
+        share = excess[within] / (excess[within] - excess[beyond])
+        return float(values[within] + share * (values[beyond] - values[within]))
+
+    return [(crossing(int(a), int(a) - 1), crossing(int(b), int(b) + 1)) for a, b in zip(first, last, strict=True)]
+
+
+def _contours(axes: Axes, data: CalibrationData) -> None:
+    table = data.objective.pivot(index="friction", columns="cohesion_kJ_m3", values="deviance")
+    grid = (table.columns.to_numpy(np.float64), table.index.to_numpy(np.float64), table.to_numpy(np.float64))
+    filled = axes.contourf(*grid, levels=LEVELS, cmap="Blues", extend="max")
+    bar = axes.figure.colorbar(filled, ax=axes, label=DEVIANCE, pad=0.02)
+    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    if grid[2].max() > THRESHOLD:
+        axes.contour(*grid, levels=[THRESHOLD], colors=style.INK, linewidths=1.1).set_gid("region")
+        axes.plot(
+            [], [], color=style.INK, linewidth=1.1, label=f"95 % region of one parameter (deviance {THRESHOLD:.2f})"
+        )
+    cohesion, friction = data.cohesion, data.estimate("friction")
+    _edges(axes, cohesion, friction)
+    axes.plot(
+        [cohesion[0]],
+        [friction[0]],
+        style.marker(0),
+        color=style.colour(1),
+        markeredgecolor=style.INK,
+        markersize=6.0,
+        clip_on=False,
+        label=f"best: cohesion {calibrated.with_interval(*cohesion, unit=' kJ/m³')},\n"
+        f"friction {calibrated.with_interval(*friction)}",
+        zorder=5,
+        gid="best",
+    )
+    axes.set_ylabel("Coefficient of friction (–)")
+
+
+def _edges(axes: Axes, cohesion: tuple[float, float, float], friction: tuple[float, float, float]) -> None:
+    """Draw the 95 % intervals of both parameters along the axes."""
+    look: dict[str, Any] = {"color": style.colour(1), "linewidth": 3.0, "solid_capstyle": "butt", "clip_on": False}
+    look |= {"zorder": 4, "gid": "interval"}
+    axes.plot(cohesion[1:], [0.0, 0.0], transform=axes.get_xaxis_transform(), label="95 % intervals", **look)
+    axes.plot([0.0, 0.0], friction[1:], transform=axes.get_yaxis_transform(), **look)
+
+
+def _findings(data: CalibrationData) -> list[str]:
+    """Lines of the findings, each finding a sentence."""
+    lines = []
+    for finding in data.summary["findings"]:
+        sentence = f"• {finding['text'][:1].upper()}{finding['text'][1:]}."
+        lines += textwrap.wrap(sentence, CHARACTERS[data.fits_friction], subsequent_indent="   ")
+    return lines
+
+
+def _say(axes: Axes, lines: list[str]) -> None:
+    """Write the findings under the abscissa's label, where the layout makes room for them."""
+    if lines:
+        axes.annotate(
+            "\n".join(lines),
+            (0.0, 0.0),
+            xycoords=(axes.transAxes, axes.xaxis.label),
+            xytext=(0.0, -5.0),
+            textcoords="offset points",
+            ha="left",
+            va="top",
+            fontsize=7.0,
+            color=style.INK,
+            linespacing=1.25,
+            annotation_clip=False,
+            gid="findings",
+        )

@@ -1,0 +1,118 @@
+"""Modelled against measured resistance at the calibrated parameters, and as predicted from the other measurements."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from filtercake.figures import calibrated, style
+from filtercake.units import FloatArray
+
+if TYPE_CHECKING:
+    from filtercake.figures.calibrated import CalibrationData
+
+MARGIN = 1.08
+"""Factor by which the axes go beyond the data."""
+ENTRY_HEIGHT = 0.13
+"""Of an entry of the legend, in."""
+
+
+def draw(data: CalibrationData) -> Figure:
+    """Draw every measurement, with the 95 % intervals of both sides."""
+    # the axes are nearly square; matplotlib's layout does not keep the labels of exactly square ones apart
+    figure, (axes,) = style.panels(width=style.SINGLE, height=4.2 + ENTRY_HEIGHT * (len(data.measured) + 2))
+    axes.set_title(calibrated.panel_title(data, 45), loc="left")
+    for csd in data.measured:
+        _distribution(axes, data, csd)
+    means = calibrated.measured_means(data)
+    keys = []
+    if means["left_out_m_kg"].notna().any():
+        _left_out(axes, data, means)
+        hollow: dict[str, Any] = {"marker": "o", "markersize": 8.0, "markerfacecolor": "none", "linewidth": 0.0}
+        keys.append(style.key("predicted from the other distributions", markeredgecolor=style.FAINT, **hollow))
+    low, high = _limits(data, means)
+    axes.plot(
+        [low, high], [low, high], color=style.INK, linewidth=0.8, zorder=1, label="modelled = measured", gid="equal"
+    )
+    style.resistance_axis(axes, np.array([low, high]), log=True, factor=", modelled")
+    resistance_abscissa(axes, np.array([low, high]), ", measured")
+    axes.set_xlim(low, high)
+    axes.set_ylim(low, high)
+    style.legend(figure, [axes], columns=1, extra=keys)
+    rows = calibrated.fitted_packings(data)
+    calibrated.footer(
+        figure, data, [calibrated.count(rows)], rows["engine"], "bars: 95 % intervals", typical_errors(means)
+    )
+    return figure
+
+
+def resistance_abscissa(axes: Axes, values: FloatArray, what: str = "") -> None:
+    """Label the x axis as :func:`style.resistance_axis` labels a logarithmic y axis; the data stay in m/kg."""
+    exponent = int(np.floor(np.log10(np.nanmax(values))))
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel(f"Specific cake resistance{what} ({style.power_of_ten(exponent)} m/kg)")
+
+
+def typical_errors(means: pd.DataFrame) -> str:
+    """Say how far the model is from the measured means of the distributions: root mean square of the ln error."""
+    measured = np.log(means["measured_m_kg"].to_numpy(np.float64))
+    words = []
+    for column, what in (("modelled_m_kg", "modelled"), ("left_out_m_kg", "predicted from the others")):
+        error = np.log(means[column].to_numpy(np.float64)) - measured
+        error = error[np.isfinite(error)]
+        if error.size:
+            percent = 100.0 * math.sqrt(float(np.mean(error**2)))
+            words.append(f"{percent:.{0 if percent >= 9.95 else 1}f} % {what}")
+    return f"typical error of ln(resistance) by distribution: {', '.join(words)}"
+
+
+def _distribution(axes: Axes, data: CalibrationData, csd: str) -> None:
+    """Plot the measurements of a distribution; markers and both ends of the bars are the table's."""
+    rows = data.parity[data.parity["csd"] == csd]
+    measured, modelled = (rows[name].to_numpy(np.float64) for name in ("measured_m_kg", "modelled_m_kg"))
+    ink = style.colour(data.number(csd))
+    look: dict[str, Any] = {"fmt": "none", "ecolor": ink, "elinewidth": 0.8, "capsize": 2.0, "zorder": 3}
+    # a bar through its own middle: the modelled value may lie beside its interval's
+    low, high = (rows[f"modelled_{end}_m_kg"].to_numpy(np.float64) for end in ("low", "high"))
+    axes.errorbar(measured, 0.5 * (low + high), yerr=0.5 * (high - low), **look)
+    low, high = _measured_interval(rows)
+    axes.errorbar(0.5 * (low + high), modelled, xerr=0.5 * (high - low), **look)
+    symbol = style.marker(data.number(csd))
+    axes.plot(measured, modelled, symbol, color=ink, label=data.label(csd), zorder=4, gid="modelled")
+
+
+def _measured_interval(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
+    measured, relative = (rows[name].to_numpy(np.float64) for name in ("measured_m_kg", "relative_uncertainty"))
+    return measured * np.exp(-calibrated.Z * relative), measured * np.exp(calibrated.Z * relative)
+
+
+def _left_out(axes: Axes, data: CalibrationData, means: pd.DataFrame) -> None:
+    for row in means.to_dict("records"):
+        number = data.number(str(row["csd"]))
+        axes.plot(
+            [row["measured_m_kg"]],
+            [row["left_out_m_kg"]],
+            style.marker(number),
+            markerfacecolor="none",
+            markeredgecolor=style.colour(number),
+            markeredgewidth=0.9,
+            markersize=8.0,  # around the filled ones, which may be at the same place
+            zorder=4,
+            gid="left_out",
+        )
+
+
+def _limits(data: CalibrationData, means: pd.DataFrame) -> tuple[float, float]:
+    """Return common ends of both axes, a little beyond all that is shown."""
+    drawn = data.parity[["modelled_m_kg", "modelled_low_m_kg", "modelled_high_m_kg"]].to_numpy(np.float64).ravel()
+    every = np.concatenate([drawn, means["left_out_m_kg"].to_numpy(np.float64), *_measured_interval(data.parity)])
+    return float(np.nanmin(every)) / MARGIN, float(np.nanmax(every)) * MARGIN

@@ -1,0 +1,107 @@
+"""Specific cake resistance against pressure drop: how compressible the cakes are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from scipy import special
+
+from filtercake.figures import style
+from filtercake.filtration import CompressibilityFit
+from filtercake.measurements import Measurement, Measurements, compressibility_by_csd, with_pressure
+from filtercake.units import KILOPASCAL
+
+BEYOND = 1.12
+"""How far a line goes beyond the lowest and the highest pressure."""
+MOST_DIGITS = 3
+"""Digits behind the point of an exponent, at most."""
+LINE, BAND = "line", "band"
+_NORMAL95 = float(special.ndtri(0.975))
+
+
+def draw(measurements: Measurements) -> Figure:
+    """Draw every distribution's resistances over pressure, with a power law where there are several pressures."""
+    figure, (axes,) = style.panels(width=style.MEDIUM, height=3.4)
+    series = with_pressure(measurements)
+    if not series:
+        style.nothing(axes, "no resistance is given with its pressure")
+        return figure
+    fits = compressibility_by_csd(measurements)
+    for index, (csd, entries) in enumerate(series.items()):
+        _series(axes, csd, entries, fits.get(csd), index, len(series))
+    alpha = np.array([entry.resistance for entries in series.values() for entry in entries])
+    style.resistance_axis(axes, alpha, log=True)
+    _pressure_axis(axes, [entry.pressure_drop or np.nan for entries in series.values() for entry in entries])
+    _widen(axes)
+    style.legend(figure, [axes], columns=1 if len(series) < 4 else 2)
+    style.footer(figure, pd.DataFrame(), *_notes(fits))
+    return figure
+
+
+def _notes(fits: dict[str, CompressibilityFit]) -> list[str]:
+    notes = ["error bars: 95 % intervals by each resistance's own error"]
+    if fits:
+        notes.append("α ∝ Δpᵏ; bands and ±: 95 % intervals of the line and of k")
+    return notes + [f"{csd}: {note}" for csd, fit in fits.items() for note in fit.notes]
+
+
+def _series(
+    axes: Axes, csd: str, entries: Sequence[Measurement], fit: CompressibilityFit | None, index: int, count: int
+) -> None:
+    pressure = np.array([entry.pressure_drop or np.nan for entry in entries])
+    alpha = np.array([entry.resistance for entry in entries])
+    factor = np.exp(_NORMAL95 * np.array([entry.relative_se for entry in entries]))
+    ink = style.colour(index)
+    drawn = axes.errorbar(
+        pressure / KILOPASCAL,
+        alpha,
+        yerr=np.stack([alpha - alpha / factor, alpha * factor - alpha]),
+        fmt=style.marker(index),
+        color=ink,
+        capsize=2.0,
+        elinewidth=0.8,
+        label=_label(csd, fit),
+        zorder=3,
+    )
+    style.shift(drawn.get_children(), axes, index, count)
+    if fit is None:
+        return
+    along = np.geomspace(pressure.min() / BEYOND, pressure.max() * BEYOND, 101)
+    value, low, high = fit.resistance_at(along)
+    axes.plot(along / KILOPASCAL, value, color=ink, gid=LINE, zorder=2)
+    if np.isfinite(low).all():
+        axes.fill_between(along / KILOPASCAL, low, high, color=ink, alpha=0.18, linewidth=0.0, gid=BAND, zorder=1)
+
+
+def _label(csd: str, fit: CompressibilityFit | None) -> str:
+    if fit is None:
+        return csd
+    half = fit.exponent_ci95
+    if np.isnan(half):
+        return f"{csd}: k = {fit.exponent:.2f} (no interval)".replace("= -", "= −")
+    digits = min(max(1 - math.floor(math.log10(half)), 0), MOST_DIGITS) if half > 0.0 else MOST_DIGITS
+    return f"{csd}: k = {fit.exponent:.{digits}f} ± {half:.{digits}f}".replace("= -", "= −")
+
+
+def _pressure_axis(axes: Axes, pressure: Sequence[float]) -> None:
+    axes.set_xscale("log")
+    wide = max(pressure) > 20.0 * min(pressure)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if wide else (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel("Pressure drop Δp (kPa)")
+    axes.set_xlim(min(pressure) / KILOPASCAL / BEYOND**2, max(pressure) / KILOPASCAL * BEYOND**2)
+
+
+def _widen(axes: Axes) -> None:
+    """Show at least a factor of two, so that the scatter of an incompressible cake does not look like a trend."""
+    low, high = axes.get_ylim()
+    if high < 2.0 * low:
+        middle = np.sqrt(low * high)
+        axes.set_ylim(middle / np.sqrt(2.0), middle * np.sqrt(2.0))

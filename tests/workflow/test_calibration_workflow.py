@@ -1,0 +1,97 @@
+"""A tiny calibration from measurements to predictions, run once; what breaks it says why before any job starts."""
+
+from __future__ import annotations
+
+import json
+
+import pandas as pd
+import pytest
+from conftest import Checkout, copy_project
+
+TINY = "config/test/calibration/tiny.yaml"
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
+    checkout = copy_project(tmp_path_factory.mktemp("calibrated") / "project")
+    done = calibrate(checkout)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return checkout
+
+
+def calibrate(checkout: Checkout, *arguments: str):
+    return checkout.snakemake("calibrate", "--config", f"calibrations={TINY}", *arguments)
+
+
+def test_every_product_is_there_and_consistent(calibrated: Checkout) -> None:
+    folder = calibrated.root / "results" / "calibration_tiny"
+    record = json.loads((folder / "calibration.json").read_text())
+    found = record["parameters"]["cohesion_kJ_m3"]
+    assert 0.0 <= found["low"] <= found["value"] <= found["high"] <= 80.0
+    assert record["estimator"] == "interior" and set(record["rivals"]) == {"0", "0.1"}
+    parity = pd.read_csv(folder / "tables" / "parity.csv")
+    assert parity["measurement"].tolist() == ["tiny_test", "bimodal"]
+    assert parity["measured_m_kg"].iloc[0] == pytest.approx(1.4e9, rel=0.02)
+    assert (parity["modelled_m_kg"] / parity["measured_m_kg"]).between(0.5, 2.0).all()
+    predictions = pd.read_csv(folder / "tables" / "predictions.csv")
+    assert predictions["csd"].tolist() == ["from_file"]
+    assert (predictions["resistance_low_m_kg"] < predictions["resistance_m_kg"]).all()
+    assert len(pd.read_csv(folder / "tables" / "fits.csv")) == 2  # both forms of one test
+    assert pd.read_csv(folder / "tables" / "compressibility.csv")["csd"].tolist() == ["bimodal"]
+    for figure in ("objective", "parity", "resistance", "predictions"):
+        assert (folder / "figures" / f"calibration_{figure}.png").stat().st_size > 10_000
+    assert (folder / "figures" / "filtration_fits.pdf").exists()
+    assert (folder / "figures" / "compressibility.pdf").exists()
+
+
+def test_rounds_follow_each_other(calibrated: Checkout) -> None:
+    folder = calibrated.root / "results" / "calibration_tiny"
+    rounds = [json.loads(path.read_text()) for path in sorted((folder / "rounds").glob("*.json"))]
+    assert len(rounds) >= 2 and [made["finished"] for made in rounds] == [False] * (len(rounds) - 1) + [True]
+    visited = [name for made in rounds for name in made["points"]]
+    assert len(visited) == len(set(visited))
+    simulated = pd.read_csv(folder / "tables" / "simulated.csv")
+    assert set(simulated["point"]) == set(visited)
+    assert (simulated["engine"] == "embedded").all()
+
+
+def test_nothing_is_left_to_do(calibrated: Checkout) -> None:
+    again = calibrate(calibrated, "--dry-run")
+    assert "Nothing to be done" in again.stdout + again.stderr
+
+
+def test_other_measurements_keep_the_packings(calibrated: Checkout) -> None:
+    file = calibrated.root / "config/test/calibration/tiny_measurements.yaml"
+    before = file.read_text()
+    manifests = list((calibrated.root / "results/calibration_tiny/packings").glob("*/replicates.json"))
+    times = {path: path.stat().st_mtime_ns for path in manifests}
+    try:
+        file.write_text(before.replace("1.5e+9", "1.6e+9"))
+        done = calibrate(calibrated)
+        assert done.returncode == 0, done.stderr
+    finally:
+        file.write_text(before)
+    assert {path: path.stat().st_mtime_ns for path in manifests} == times
+    parity = pd.read_csv(calibrated.root / "results/calibration_tiny/tables/parity.csv")
+    assert parity["measured_m_kg"].iloc[1] == pytest.approx(1.6e9)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        ("tiny.yaml", "study: ../tiny.yaml", "study: nowhere", "study = 'nowhere': no such study"),
+        ("tiny.yaml", "replicates: 2", "replicates: 1", "replicates = 1: must be greater than or equal to 2"),
+        ("tiny.yaml", "rounds: 2", "round: 2", "did you mean rounds?"),
+        ("tiny.yaml", "predict: [from_file]", "predict: [other]", "predict[0] = 'other': not in the study"),
+        ("tiny.yaml", "high: 80", "high: 500", "cohesion_kJ_m3.high = 500: must be at most"),
+        ("tiny_measurements.yaml", "{csd: bimodal", "{csd: other", "not in the study; allowed: bimodal, from_file"),
+        ("tiny_measurements.yaml", "1.5e+9", "-1", "resistances[0].resistance_m_kg = -1: must be greater than 0"),
+        ("tiny_test.csv", "volume_mL", "volume", "tiny_test.csv"),
+    ],
+)
+def test_what_is_wrong_is_said_before_any_job(checkout: Checkout, file: str, old: str, new: str, said: str) -> None:
+    path = checkout.root / "config/test/calibration" / file
+    path.write_text(path.read_text().replace(old, new))
+    done = calibrate(checkout, "--dry-run")
+    assert done.returncode != 0 and "filtercake cannot start" in done.stderr
+    assert said in done.stderr and "Traceback" not in done.stderr

@@ -1,0 +1,266 @@
+# Calibrations: packings in rounds, each chosen from the fit of those before it. A calibration is packed as a study
+# of its own, named calibration_<file>.
+CALIBRATED = {calibration.name: calibration for calibration in CALIBRATIONS}
+CANDIDATES = {
+    name: {
+        item.point.name: item
+        for item in calibration_candidates(calibration, engine_choice.choose)
+    }
+    for name, calibration in CALIBRATED.items()
+}
+KNOWN.update({name: calibration.study for name, calibration in CALIBRATED.items()})
+KNOWN_POINTS.update(
+    {
+        name: {point: item.point for point, item in group.items()}
+        for name, group in CANDIDATES.items()
+    }
+)
+TABLES = ["parity", "objective", "response", "simulated"]
+
+
+def calibration_of(wildcards):
+    return CALIBRATED[wildcards.calibration]
+
+
+def measurement_files(wildcards):
+    return [str(path) for path in calibration_of(wildcards).measurements.files]
+
+
+def calibration_csds(wildcards):
+    folder = f"{RESULTS}/{wildcards.calibration}/csd"
+    return [f"{folder}/{name}.csv" for name in calibration_of(wildcards).packed]
+
+
+def round_file(wildcards, number):
+    made = checkpoints.choose_round.get(
+        results=RESULTS, calibration=wildcards.calibration, number=number
+    )
+    return made.output[0]
+
+
+def rounds_before(wildcards):
+    return [round_file(wildcards, number) for number in range(int(wildcards.number))]
+
+
+def all_rounds(wildcards):
+    """Files of the rounds up to the one that found nothing left to do."""
+    files = []
+    while not (files and read_record(Path(files[-1]))["finished"]):
+        files.append(round_file(wildcards, len(files)))
+    return files
+
+
+def manifests_of(wildcards, points):
+    folder = f"{RESULTS}/{wildcards.calibration}/packings"
+    return [f"{folder}/{point}/{MANIFEST}" for point in points]
+
+
+def manifests_of_rounds(rounds):
+    """Packings of the rounds that another function lists."""
+    return lambda wildcards: manifests_of(
+        wildcards,
+        [
+            name
+            for file in rounds(wildcards)
+            for name in read_record(Path(file))["points"]
+        ],
+    )
+
+
+def prediction_manifests(wildcards):
+    made = checkpoints.calibrate_cohesion.get(
+        results=RESULTS, calibration=wildcards.calibration
+    )
+    record = read_record(Path(made.output.summary))
+    return manifests_of(wildcards, record["prediction_points"])
+
+
+def calibration_params(wildcards):
+    """The calibration as plain values; its candidates by name, with their batches."""
+    calibration = calibration_of(wildcards)
+    return {
+        "settings": settings_of(calibration).as_dict(),
+        "observations": [vars(item) for item in observations_of(calibration)],
+        "candidates": [
+            {"point": item.point.as_dict(), "batch": item.batch}
+            for item in CANDIDATES[wildcards.calibration].values()
+        ],
+    }
+
+
+def calibration_outputs():
+    found = []
+    for name, calibration in CALIBRATED.items():
+        folder = f"{RESULTS}/{name}"
+        figures = calibrated.figures_of(
+            bool(calibration.model.predict), calibration.measurements
+        )
+        found += [f"{folder}/calibration.json", f"{folder}/tables/fits.csv"]
+        found += [
+            f"{folder}/figures/{figure}.{suffix}"
+            for figure in figures
+            for suffix in ("png", "pdf")
+        ]
+        if calibration.model.predict:
+            found.append(f"{folder}/tables/predictions.csv")
+    return found
+
+
+wildcard_constraints:
+    calibration="calibration_[A-Za-z0-9_-]+",
+    number="[0-9]+",
+
+
+rule calibrate:
+    input:
+        calibration_outputs(),
+    localrule: True
+
+
+checkpoint choose_round:
+    input:
+        manifests_of_rounds(rounds_before),
+        rounds=rounds_before,
+        csds=calibration_csds,
+        library=library("calibration_study"),
+    output:
+        "{results}/{calibration}/rounds/{number}.json",
+    log:
+        "{results}/{calibration}/logs/rounds/{number}.log",
+    benchmark:
+        "{results}/{calibration}/benchmarks/rounds/{number}.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        calibration=calibration_params,
+        packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",
+    message:
+        "round {wildcards.number} of {wildcards.calibration}"
+    script:
+        "../scripts/choose_round.py"
+
+
+checkpoint calibrate_cohesion:
+    input:
+        manifests_of_rounds(all_rounds),
+        rounds=all_rounds,
+        csds=calibration_csds,
+        library=library("calibration_study"),
+    output:
+        summary="{results}/{calibration}/calibration.json",
+        tables=expand("{{results}}/{{calibration}}/tables/{table}.csv", table=TABLES),
+    log:
+        "{results}/{calibration}/logs/calibration.log",
+    benchmark:
+        "{results}/{calibration}/benchmarks/calibration.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        calibration=calibration_params,
+        packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",
+    message:
+        "fitting {wildcards.calibration}"
+    script:
+        "../scripts/calibrate.py"
+
+
+rule predictions:
+    input:
+        prediction_manifests,
+        manifests_of_rounds(all_rounds),
+        summary="{results}/{calibration}/calibration.json",
+        rounds=all_rounds,
+        csds=calibration_csds,
+        library=library("calibration_study"),
+        tables=library("tables"),
+    output:
+        "{results}/{calibration}/tables/predictions.csv",
+    log:
+        "{results}/{calibration}/logs/predictions.log",
+    benchmark:
+        "{results}/{calibration}/benchmarks/predictions.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        calibration=calibration_params,
+        packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",
+        study=lambda wildcards: calibration_of(wildcards).study.model.model_dump(
+            mode="json"
+        ),
+    message:
+        "predictions of {wildcards.calibration}"
+    script:
+        "../scripts/predictions.py"
+
+
+rule measurement_fits:
+    input:
+        files=measurement_files,
+        library=library("measurements"),
+    output:
+        fits="{results}/{calibration}/tables/fits.csv",
+        compressibility="{results}/{calibration}/tables/compressibility.csv",
+    log:
+        "{results}/{calibration}/logs/fits.log",
+    benchmark:
+        "{results}/{calibration}/benchmarks/fits.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    message:
+        "fitting the filtration tests of {wildcards.calibration}"
+    script:
+        "../scripts/measurement_fits.py"
+
+
+rule calibration_figure:
+    input:
+        files=measurement_files,
+        summary="{results}/{calibration}/calibration.json",
+        tables=expand("{{results}}/{{calibration}}/tables/{table}.csv", table=TABLES),
+        predictions=lambda wildcards: (
+            [f"{RESULTS}/{wildcards.calibration}/tables/predictions.csv"]
+            if calibration_of(wildcards).model.predict
+            else []
+        ),
+        library=lambda wildcards: library(calibrated.module_of(wildcards.figure)),
+    output:
+        png=report(
+            "{results}/{calibration}/figures/{figure}.png",
+            category="{calibration}",
+            caption="../report/figure.rst",
+            labels={"figure": "{figure}"},
+        ),
+        pdf="{results}/{calibration}/figures/{figure}.pdf",
+    log:
+        "{results}/{calibration}/logs/figures/{figure}.log",
+    benchmark:
+        "{results}/{calibration}/benchmarks/figures/{figure}.tsv"
+    wildcard_constraints:
+        figure="|".join(calibrated.CALIBRATION_FIGURES),
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=2000,
+        runtime=15,
+    params:
+        title=lambda wildcards: calibration_of(wildcards).model.title,
+        labels=lambda wildcards: {
+            name: csd.label
+            for name, csd in calibration_of(wildcards).study.csds.items()
+        },
+    message:
+        "{wildcards.figure} of {wildcards.calibration}"
+    script:
+        "../scripts/calibration_figure.py"

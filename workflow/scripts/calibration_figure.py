@@ -1,0 +1,27 @@
+"""Rule calibration_figure: draw one figure of a calibration as PNG and PDF."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.figures.calibrated import CalibrationData, draw
+from filtercake.figures.catalogue import save
+from filtercake.job import job
+from filtercake.measurements import load_measurements
+from filtercake.packing.result import read_record
+
+NAMES = {"csd": str, "point": str}
+
+with job(snakemake.log[0]):
+    tables = {Path(table).stem: pd.read_csv(table, dtype=NAMES) for table in snakemake.input.tables}
+    predictions = [pd.read_csv(table, dtype=NAMES) for table in snakemake.input.predictions]
+    data = CalibrationData(
+        name=snakemake.wildcards.calibration,
+        title=snakemake.params.title,
+        summary=read_record(Path(snakemake.input.summary)),
+        predictions=predictions[0] if predictions else None,
+        labels=dict(snakemake.params.labels),
+        measurements=load_measurements(Path(snakemake.input.files[0])),
+        **tables,
+    )
+    save(draw(snakemake.wildcards.figure, data), Path(snakemake.output.png), Path(snakemake.output.pdf))

@@ -1,0 +1,33 @@
+"""Rule predictions: resistance and filter area of distributions that were never tested."""
+
+from pathlib import Path
+
+from filtercake.calibration_study import Task, conclude, prediction_table
+from filtercake.config import Study
+from filtercake.job import job
+from filtercake.packing.result import publish, read_record
+from filtercake.tables import drum_of
+from filtercake.units import HOUR
+
+
+def main(task, packings, tables, rounds, summary, study):
+    """Fit again, which costs a second, and predict."""
+    visited = [name for file in rounds for name in read_record(Path(file))["points"]]
+    outcome = conclude(task.settings, task.observations, task.simulate(visited, packings, tables))
+    near = task.simulate(read_record(Path(summary))["prediction_points"], packings, tables)
+    drum = drum_of(study) if study.filter else None
+    flow = study.crystallizer.slurry_flow_m3_h / HOUR if study.filter else 0.0
+    return prediction_table(outcome, task.settings, near, task.full_csds(tables), drum, flow)
+
+
+with job(snakemake.log[0]):
+    table = main(
+        Task.from_params(snakemake.params.calibration),
+        Path(snakemake.params.packings),
+        snakemake.input.csds,
+        snakemake.input.rounds,
+        snakemake.input.summary,
+        Study.model_validate(snakemake.params.study),
+    )
+    with publish(Path(snakemake.output[0])) as temporary:
+        table.to_csv(temporary, index=False)
