@@ -9,7 +9,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run calibrate test test-all lint format schemas figures regression speed growth agreement bed-size references resume retry lock setup clean help
+.PHONY: run calibrate test test-all lint format schemas figures regression speed growth agreement twin bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -58,6 +58,9 @@ growth: setup ## the embedded engine's time per sphere and step against N and si
 
 agreement: setup ## both engines on the same clouds, nine cases (about 45 min on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) agreement
+
+twin: setup ## twenty calibrations whose answer is known, with and without friction (about 1 h on 2 cores)
+	$(SNAKEMAKE) twin
 
 bed-size: setup ## several beds of N = 20 000 against one of N = 100 000, alum (about 10 min)
 	$(SNAKEMAKE) bed_size --config studies=alum,alum_full

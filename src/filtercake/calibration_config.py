@@ -214,7 +214,7 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
     name = f"calibration_{path.stem}"
     asked = {"replicates": model.replicates, "engine": model.engine or study.model.packing.engine}
     packing = study.model.packing.model_copy(update=asked)
-    own = study.model.model_copy(update={"packing": packing, "sweeps": []})
+    own = study.model.model_copy(update={"packing": packing})
     return LoadedCalibration(
         name=name,
         path=path,

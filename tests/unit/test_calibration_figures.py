@@ -38,10 +38,12 @@ from filtercake.figures.calibrated import (
 )
 from filtercake.figures.calibration_objective import THRESHOLD, stretches
 from filtercake.figures.catalogue import save
+from filtercake.measurements import load_measurements
 from filtercake.study import half_width
 
 pytestmark = pytest.mark.filterwarnings("error")
 
+EXAMPLE = Path(__file__).parents[2] / "config" / "measurements" / "synthetic_tests.yaml"
 Z = 1.959964
 COHESIONS = (0.0, 20.0, 40.0, 60.0, 80.0, 100.0)
 LABELS = {"a": "75/25 wt% 20/50 µm", "b": "50/50 wt% 20/50 µm", "c": "25/75 wt% 20/50 µm", "d": "20 µm", "e": "50 µm"}
@@ -215,7 +217,12 @@ def spans(artists: Sequence[Any]) -> list[tuple[float, float]]:
 class TestCatalogue:
     def test_predictions_have_their_own(self) -> None:
         assert set(figures_of(True)) - set(figures_of(False)) == {"calibration_predictions"}
-        assert figures_of(True) == list(CALIBRATION_FIGURES)
+        of_tests = [name for name, figure in CALIBRATION_FIGURES.items() if figure.of_tests]
+        assert figures_of(True) == [name for name in CALIBRATION_FIGURES if name not in of_tests]
+        measurements = load_measurements(EXAMPLE)
+        assert figures_of(True, measurements) == list(CALIBRATION_FIGURES)
+        assert set(figures_of(False, measurements)) == set(CALIBRATION_FIGURES) - {"calibration_predictions"}
+        assert of_tests == ["filtration_fits", "compressibility"]
 
     def test_every_figure_has_its_module(self) -> None:
         folder = Path(style.__file__).parent

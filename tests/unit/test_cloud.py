@@ -57,6 +57,22 @@ def test_box_length_scales_with_the_sizes(particles: int, void_fraction: float, 
     assert box_length(small, 8 * particles, void_fraction) == pytest.approx(2 * once, rel=1e-12)
 
 
+@given(st.integers(100, 10_000), st.floats(0.5, 0.9), st.floats(0.5, 10.0))
+def test_a_deep_box_is_as_deep_as_a_wide_one_of_more_spheres(particles: int, void_fraction: float, c: float) -> None:
+    csd = mixture([20 * UM, 50 * UM], [0.5, 0.5])
+    deep = box_length(csd, particles, void_fraction, c)
+    assert 2.0 * c * deep**3 == pytest.approx(2.0 * box_length(csd, particles, void_fraction) ** 3, rel=1e-12)
+    # depth c L of N spheres is L of c^2 N
+    assert c * deep == pytest.approx(box_length(csd, 1, void_fraction) * (c**2 * particles) ** (1 / 3), rel=1e-12)
+
+
+def test_a_deep_cloud_has_the_void_fraction_asked_for(pmma) -> None:
+    cloud = make_cloud(pmma(0.5), 1000, 0.65, 3, column_ratio=2.0)
+    assert cloud.height == pytest.approx(4.0 * cloud.length)
+    assert cloud.void_fraction == pytest.approx(0.65, abs=2e-3)
+    assert smallest_gap(cloud) > 0.0 and cloud.position[:, 2].max() > 3.0 * cloud.length
+
+
 # --- placement -----------------------------------------------------------------------------------------------------
 
 

@@ -260,3 +260,10 @@ def test_a_bed_lower_than_the_box_is_wide_counts_no_air_above_it(make_spec) -> N
     assert found.from_floor == pytest.approx(1.0 - math.pi / 6.0, abs=1e-12)
     # the published count does: 4 of 6 layers
     assert found.as_published == pytest.approx(1.0 - math.pi / 6.0 * 4 / 6, abs=1e-12)
+
+
+def test_as_published_count_goes_as_deep_as_the_column() -> None:
+    position = np.array([[1.0, 1.0, z] for z in (0.5, 1.5, 2.5, 3.5, 4.5)])
+    radius = np.full(5, 0.5)
+    assert as_published_porosity(position, radius, 2.0, 2.0) == pytest.approx(1.0 - 4.0 * math.pi / 6.0 / 16.0)
+    assert as_published_porosity(position, radius, 2.0, 1.0) == as_published_porosity(position, radius, 2.0)

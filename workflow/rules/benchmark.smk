@@ -45,6 +45,51 @@ rule compare_engines:
         "../scripts/agreement.py"
 
 
+# calibrations whose answer is known
+TWIN = {
+    study.name: study
+    for study in load_studies(
+        ROOT / "config" / "benchmarks" / f"{name}.yaml"
+        for name in ("twin", "twin_truth")
+    )
+}
+KNOWN.update(TWIN)
+KNOWN_POINTS.update(points_by_name(TWIN))
+
+
+rule twin:
+    input:
+        expand("{results}/benchmark/twin.csv", results=RESULTS),
+    localrule: True
+
+
+rule repeat_calibrations:
+    input:
+        pool=expand("{results}/twin/replicates.csv", results=RESULTS),
+        truth=expand("{results}/twin_truth/replicates.csv", results=RESULTS),
+        library=library("twin"),
+    output:
+        table="{results}/benchmark/twin.csv",
+        repeats="{results}/benchmark/twin_repeats.csv",
+    log:
+        "{results}/benchmark/logs/twin.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/twin.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        repeats=20,
+        tests=4,
+        noise=0.05,
+    message:
+        "twenty calibrations whose answer is known"
+    script:
+        "../scripts/twin.py"
+
+
 # several beds held against one of the paper's own size; the studies must be among those asked for
 BED_SIZES = ["alum", "alum_full"]
 

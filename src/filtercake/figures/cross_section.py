@@ -101,8 +101,10 @@ def _spheres(figure: Figure, axes: Axes, packing: Packing) -> None:
         figure.colorbar(ScalarMappable(norm, shades), ax=axes, label="Sphere diameter (µm)", shrink=0.8)
     side = packing.length / MICROMETRE
     axes.set_xlim(0.0, side)
+    # up to what lies on the bed: a sphere that was thrown up and has not come back would stretch the picture
+    lying = bed_height(packing.position, packing.radius) + 2.0 * float(packing.radius.max())
     highest = float((packing.position[:, 2] + packing.radius).max())
-    top = max(highest, bed_height(packing.position, packing.radius)) / MICROMETRE
+    top = min(highest, lying) / MICROMETRE
     axes.set_ylim(-0.02 * top, 1.02 * top)
     axes.set_aspect("equal")
 

@@ -1,0 +1,25 @@
+"""Rule repeat_calibrations: how often calibrations find a cohesion that is known."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.job import job
+from filtercake.packing.result import publish
+from filtercake.twin import repeat_calibrations, summarise
+
+with job(snakemake.log[0]) as log:
+    pool, truth = (pd.read_csv(file[0]) for file in (snakemake.input.pool, snakemake.input.truth))
+    asked = {name: snakemake.params[name] for name in ("repeats", "tests", "noise")}
+    repeats = pd.concat(
+        [
+            repeat_calibrations(pool[pool["friction"] == friction], truth[truth["friction"] == friction], **asked)
+            for friction in sorted(truth["friction"].unique())
+        ],
+        ignore_index=True,
+    )
+    table = summarise(repeats)
+    log.info("\n%s", table.to_string())
+    for output, made in ((snakemake.output.repeats, repeats), (snakemake.output.table, table)):
+        with publish(Path(output)) as temporary:
+            made.to_csv(temporary, index=False)
