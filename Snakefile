@@ -13,6 +13,7 @@ include: "workflow/rules/csd.smk"
 include: "workflow/rules/packing.smk"
 include: "workflow/rules/resistance.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/common_calibration.smk"
 include: "workflow/rules/calibration.smk"
 include: "workflow/rules/benchmark.smk"
 

@@ -1,4 +1,4 @@
-"""The twin experiment: does a calibration find a cohesion that is known, as often as its interval says?"""
+"""The twin experiment: calibrations of a cohesion that is known, and how often their intervals hold it."""
 
 from __future__ import annotations
 
@@ -69,7 +69,8 @@ def repeat_calibrations(
 def summarise(table: pd.DataFrame) -> pd.DataFrame:
     """Count, per truth, how often the interval covered it, and the median error and half-width, both relative."""
     rows = []
-    for (friction, truth), group in table.groupby(["friction", "truth_kJ_m3"]):
+    for _, group in table.groupby(["friction", "truth_kJ_m3"]):
+        friction, truth = (float(group[name].iloc[0]) for name in ("friction", "truth_kJ_m3"))
         half = 0.5 * (group["high_kJ_m3"] - group["low_kJ_m3"]) / truth
         covered, error = int(group["covered"].sum()), float(group["relative_error"].median())
         rows.append((friction, truth, len(group), covered, error, float(half.median())))

@@ -1,0 +1,105 @@
+# What the rules of calibrations share: points, and which of them the rounds so far ask for.
+CALIBRATED = {calibration.name: calibration for calibration in CALIBRATIONS}
+CANDIDATES = {
+    name: {
+        item.point.name: item
+        for item in calibration_candidates(calibration, engine_choice.choose)
+    }
+    for name, calibration in CALIBRATED.items()
+}
+KNOWN.update({name: calibration.study for name, calibration in CALIBRATED.items()})
+KNOWN_POINTS.update(
+    {
+        name: {point: item.point for point, item in group.items()}
+        for name, group in CANDIDATES.items()
+    }
+)
+TABLES = ["parity", "objective", "response", "simulated"]
+
+
+def calibration_of(wildcards):
+    return CALIBRATED[wildcards.calibration]
+
+
+def measurement_files(wildcards):
+    return [str(path) for path in calibration_of(wildcards).measurements.files]
+
+
+def calibration_csds(wildcards):
+    folder = f"{RESULTS}/{wildcards.calibration}/csd"
+    return [f"{folder}/{name}.csv" for name in calibration_of(wildcards).packed]
+
+
+def round_file(wildcards, number):
+    made = checkpoints.choose_round.get(
+        results=RESULTS, calibration=wildcards.calibration, number=number
+    )
+    return made.output[0]
+
+
+def rounds_before(wildcards):
+    return [round_file(wildcards, number) for number in range(int(wildcards.number))]
+
+
+def all_rounds(wildcards):
+    """Files of the rounds up to the one that found nothing left to do."""
+    files = []
+    while not (files and read_record(Path(files[-1]))["finished"]):
+        files.append(round_file(wildcards, len(files)))
+    return files
+
+
+def manifests_of(wildcards, points):
+    folder = f"{RESULTS}/{wildcards.calibration}/packings"
+    return [f"{folder}/{point}/{MANIFEST}" for point in points]
+
+
+def manifests_of_rounds(rounds):
+    """Packings of the rounds that another function lists."""
+    return lambda wildcards: manifests_of(
+        wildcards,
+        [
+            name
+            for file in rounds(wildcards)
+            for name in read_record(Path(file))["points"]
+        ],
+    )
+
+
+def prediction_manifests(wildcards):
+    made = checkpoints.calibrate_cohesion.get(
+        results=RESULTS, calibration=wildcards.calibration
+    )
+    record = read_record(Path(made.output.summary))
+    return manifests_of(wildcards, record["prediction_points"])
+
+
+def calibration_params(wildcards):
+    """The calibration as plain values; its candidates by name, with their batches."""
+    calibration = calibration_of(wildcards)
+    return {
+        "settings": settings_of(calibration).as_dict(),
+        "observations": [vars(item) for item in observations_of(calibration)],
+        "candidates": [
+            {"point": item.point.as_dict(), "batch": item.batch}
+            for item in CANDIDATES[wildcards.calibration].values()
+        ],
+    }
+
+
+def calibration_outputs():
+    found = []
+    for name, calibration in CALIBRATED.items():
+        folder = f"{RESULTS}/{name}"
+        figures = calibrated.figures_of(
+            bool(calibration.model.predict), calibration.measurements
+        )
+        found += [f"{folder}/calibration.json", f"{folder}/tables/fits.csv"]
+        found += [
+            f"{folder}/figures/{figure}.{suffix}"
+            for figure in figures
+            for suffix in ("png", "pdf")
+        ]
+        if calibration.model.predict:
+            found.append(f"{folder}/tables/predictions.csv")
+    return found
