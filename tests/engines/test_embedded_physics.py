@@ -248,3 +248,32 @@ def test_same_seed_same_packing(tmp_path):
     assert np.array_equal(first.position, again.position)
     other = pack(replace(scene, seed=2), csd, 0, tmp_path)
     assert not np.array_equal(first.position, other.position)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_no_contact_is_missed_between_two_choices_of_near_pairs(friction):
+    """A fast sphere flies into a quiet lattice: asked for at every step, the near pairs are chosen anew each time.
+
+    Many steps in one call must give the same to the last bit, although spheres become fast in between.
+    """
+    speed, step = 1.0, 0.3e-6
+    gap = 4.5 * speed * step  # further than quiet spheres are expected to move, nearer than those that are hit do
+    pitch = 2.0 * RADIUS + gap
+    grid = np.array([(x, y, z) for z in range(3) for y in range(10) for x in range(10)], dtype=float)
+    position = 100e-6 + pitch * grid
+    # from below, so that it shares a patch with the first rows of the lowest layer, and flies at the last
+    bullet = position[95] + [0.3 * RADIUS, 0.1 * RADIUS, -(2.0 * RADIUS + 2.5 * speed * step)]
+    position = np.vstack([position, bullet])
+    velocity = np.zeros_like(position)
+    velocity[-1, 2] = speed
+    scene = spec(particles=len(position), time_step=step, skin=18e-6, friction=friction, restitution=0.9)
+    at_once, one_by_one = (
+        Bed(position, velocity, np.full(len(position), RADIUS), LENGTH, scene, gravity=0.0) for _ in range(2)
+    )
+    at_once.advance(90)
+    for _ in range(90):
+        one_by_one.advance(1)
+    for found, expected in zip(at_once.state(), one_by_one.state(), strict=True):
+        assert np.array_equal(found, expected)
+    moving = np.linalg.norm(at_once.state()[1], axis=1) > 1e-3
+    assert moving.sum() > 5  # the blow has gone through the lattice
