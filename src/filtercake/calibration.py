@@ -416,11 +416,12 @@ def _findings(calibration: Calibration, distributions: int) -> tuple[Finding, ..
             )
         )
     if calibration.discrepancy > 0.0:
+        degrees = f"{calibration.degrees_of_freedom} degree{'s' if calibration.degrees_of_freedom > 1 else ''}"
         found.append(
             Finding(
                 "misfit",
                 "no parameters describe all measurements within their errors "
-                f"(chi-square {calibration.chi_square:.1f} with {calibration.degrees_of_freedom} degrees of freedom): "
+                f"(chi-square {calibration.chi_square:.1f} with {degrees} of freedom): "
                 f"a discrepancy of {100.0 * calibration.discrepancy:.0f} % per distribution is added to the errors",
             )
         )
