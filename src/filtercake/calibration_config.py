@@ -122,7 +122,7 @@ class LoadedCalibration:
     model : Calibration
         Its contents.
     study : LoadedStudy
-        The study, under the calibration's name and with its replicates.
+        The study, under the calibration's name and with its replicates and warnings.
     measurements : Measurements
         What was measured.
     implied_porosity : float
@@ -212,6 +212,7 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
         raise ConfigError(problems)
     porosity = _implied_porosity(study, measurements)
     name = f"calibration_{path.stem}"
+    warnings = (*measurements.warnings, *_doubts(model, study, path))
     asked = {"replicates": model.replicates, "engine": model.engine or study.model.packing.engine}
     packing = study.model.packing.model_copy(update=asked)
     own = study.model.model_copy(update={"packing": packing})
@@ -219,11 +220,11 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
         name=name,
         path=path,
         model=model,
-        study=replace(study, name=name, model=own),
+        study=replace(study, name=name, model=own, warnings=warnings),
         measurements=measurements,
         implied_porosity=porosity,
         frictions=_frictions(model, porosity),
-        warnings=(*measurements.warnings, *_doubts(model, study, path)),
+        warnings=warnings,
     )
 
 

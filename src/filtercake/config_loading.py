@@ -260,7 +260,8 @@ def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
     elif item["type"] == "literal_error":
         message = f"allowed: {item['ctx']['expected']}"
     elif item["type"] == "too_short":
-        message = "must hold at least one value"
+        least = item["ctx"]["min_length"]
+        message = "must hold at least one value" if least == 1 else f"must hold at least {least} values"
     elif " should " in message:
         message = "must " + message.partition(" should ")[2]
     return Problem(file, key, value, message)

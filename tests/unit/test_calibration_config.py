@@ -1,0 +1,91 @@
+"""Calibration files: what they lead to, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from filtercake.calibration_config import candidates, load_calibration, load_calibrations, observations_of, settings_of
+from filtercake.calibration_study import BATCHES
+from filtercake.errors import ConfigError
+
+ROOT = Path(__file__).parents[2]
+STUDIES = ROOT / "config" / "studies"
+TINY = (ROOT / "config/test/calibration/tiny.yaml").read_text()
+MEASUREMENTS = "resistances:\n  - {csd: bimodal, resistance_m_kg: VALUE, relative_uncertainty: 0.05, source: made up}\n"
+
+
+def load(folder: Path, text: str = TINY, resistance: str = "1.4e+9"):
+    study = ROOT / "config/test/tiny.yaml"
+    (folder / "measured.yaml").write_text(MEASUREMENTS.replace("VALUE", resistance))
+    text = text.replace("../tiny.yaml", str(study)).replace("tiny_measurements.yaml", "measured.yaml")
+    (folder / "mine.yaml").write_text(text)
+    return load_calibration(folder / "mine.yaml", STUDIES)
+
+
+def test_a_calibration_is_a_study_of_its_own(tmp_path: Path) -> None:
+    found = load(tmp_path)
+    assert found.name == found.study.name == "calibration_mine"
+    assert found.study.model.packing.engine == "embedded" and found.study.model.packing.replicates == 2
+    assert found.measured == ("bimodal",) and found.packed == ("bimodal", "from_file")
+    (observation,) = observations_of(found)
+    assert observation.ln_resistance == pytest.approx(math.log(1.4e9)) and observation.standard_error == 0.05
+    settings = settings_of(found)
+    assert settings.cohesions == tuple(float(s) for s in range(0, 81, 10))
+    assert settings.density == 1180.0 and settings.frictions == (0.0, 0.1)
+
+
+def test_candidates_are_every_point_in_every_batch(tmp_path: Path) -> None:
+    found = candidates(load(tmp_path), lambda _csd, _n: "")
+    assert len(found) == BATCHES * 2 * 9 * 2
+    assert len({item.point.name for item in found}) == len(found)
+    assert {item.point.spec.seed for item in found if item.batch == 0} == {1}
+    assert {item.point.spec.seed for item in found if item.batch == 2} == {3}
+    assert {item.point.replicates for item in found} == {2}
+
+
+@pytest.mark.parametrize(("resistance", "friction"), [("1.4e+9", 0.0), ("0.7e+9", 0.05)])
+def test_friction_follows_the_papers_advice(tmp_path: Path, resistance: str, friction: float) -> None:
+    found = load(tmp_path, TINY.replace("friction: 0\n", "").replace("rival_friction: [0.1]\n", ""), resistance)
+    assert found.frictions == (friction,)
+    assert (found.implied_porosity < 0.4) == (friction == 0.0)
+
+
+def test_friction_may_be_fitted(tmp_path: Path) -> None:
+    text = TINY.replace("friction: 0\n", "").replace("rival_friction: [0.1]", "fit_friction: [0, 0.05, 0.3]")
+    found = load(tmp_path, text)
+    assert [p.name for p in found.parameters] == ["cohesion_kJ_m3", "friction"]
+    assert (found.parameters[1].low, found.parameters[1].high) == (0.0, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("rival_friction: [0.1]", "fit_friction: [0, 0.1]", "must hold at least 3 values"),
+        ("rival_friction: [0.1]", "fit_friction: [0, 0.1, 0.3]", "fit_friction goes without friction"),
+        ("low: 0, high: 80", "low: 80, high: 0", "low must be below high"),
+        ("step: 10", "step: 60", "step must divide the range"),
+        ("tiny_measurements.yaml", "nowhere.yaml", "cannot be read"),
+        ("title:", "titel:", "did you mean title?"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        load(tmp_path, TINY.replace(old, new))
+    assert said in str(error.value)
+
+
+def test_a_wide_range_is_doubted_and_one_too_wide_refused(tmp_path: Path) -> None:
+    assert not load(tmp_path).warnings
+    wide = load(tmp_path, TINY.replace("high: 80", "high: 120"))
+    assert len(wide.warnings) == 1 and wide.study.warnings == wide.warnings
+    with pytest.raises(ConfigError, match="must be at most"):
+        load(tmp_path, TINY.replace("high: 80", "high: 600"))
+
+
+def test_unknown_calibrations_are_listed(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_calibrations(["pmmma", "pmma"], ROOT / "config/calibrations", STUDIES, "config/config.yaml")
+    assert "calibrations[0] = 'pmmma': no such calibration; allowed: pmma, pmma_paper, synthetic" in str(error.value)
