@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -237,6 +238,12 @@ class TestUse:
         new = response(77, 0.7)
         widths = [math.log(found.high / found.low) for found in (predict(sharp, new), predict(vague, new))]
         assert widths[1] > 2.0 * widths[0]
+
+    def test_prediction_holds_the_discrepancy(self) -> None:
+        found, new = fitted(2), response(77, 0.7)
+        plain, doubted = predict(found, new), predict(replace(found, discrepancy=0.25), new)
+        reach = math.log(doubted.high / doubted.low)
+        assert reach == pytest.approx(math.hypot(math.log(plain.high / plain.low), 2.0 * 1.96 * 0.25), rel=0.03)
 
     def test_next_cohesions_refine_where_the_interval_is(self) -> None:
         candidates = list(np.arange(0.0, 101.0, 5.0))
