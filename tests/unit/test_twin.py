@@ -42,6 +42,15 @@ def test_known_cohesion_is_found_as_often_as_the_interval_says() -> None:
     assert table["value_kJ_m3"].nunique() == 20  # every repeat has packings and measurements of its own
 
 
+def test_every_repeat_has_packings_of_its_own() -> None:
+    """Every second replicate is of a harder cake: the second of two repeats gets those, and finds another cohesion."""
+    pool = packings(1, VALUES, 8)
+    pool.loc[pool["replicate"] % 2 == 1, "resistance_m_kg"] *= 1.2
+    table = repeat_calibrations(pool, packings(2, (45.0,), 40), repeats=2, tests=4, noise=0.001)
+    first, second = table["value_kJ_m3"]
+    assert abs(first - 45.0) < 5.0 and second > first + 5.0
+
+
 def test_a_wrong_model_is_found_out() -> None:
     """Measured cakes 15 % harder than the packings can be: the intervals miss."""
     hard = packings(2, (35.0,), 40, shift=0.15)
