@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from filtercake.study import SWEPT, half_width
+from filtercake.config import SWEPT
+from filtercake.precision import half_width
 
 STANDARD_ERRORS = 2.0
 """Combined standard errors within which two means agree."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import resource
 import tempfile
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.csd import CrystalSizeDistribution
-from filtercake.errors import PackingRejected
+from filtercake.errors import EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
 from filtercake.packing.engines import Engine, get_engine
 from filtercake.packing.engines.embedded import Embedded
@@ -22,12 +24,14 @@ from filtercake.packing.pack import settle
 from filtercake.packing.result import Packing
 from filtercake.packing.spec import PackingSpec
 from filtercake.porosity import measure
-from filtercake.study import half_width
+from filtercake.precision import half_width
 
 WARM_UP_PARTICLES = 60
 """Spheres packed before the clock starts: the embedded engine's kernels are compiled once per machine."""
 MEGABYTE = 1024.0
 """Kibibytes in the unit of the table's memory."""
+
+POROSITIES = ("porosity", "porosity_from_floor", "porosity_as_published")
 
 Report = Callable[[str], None]
 
@@ -82,8 +86,8 @@ def time_in_turn(
     Returns
     -------
     DataFrame
-        Columns engine, particles, replicate, wall_s (the engine's own), steps, status, porosity,
-        porosity_as_published, peak_memory_MB (of this process: the embedded engine's).
+        Columns engine, particles and those of :func:`settle_timed`: wall_s is the engine's own, peak_memory_MB of
+        this process (the embedded engine's).
     """
     listed = list(contenders)
     for each in listed:
@@ -91,7 +95,7 @@ def time_in_turn(
     rows: list[dict[str, Any]] = []
     for replicate in range(replicates):
         for each in listed:
-            rows.append({"engine": each.name, "particles": each.spec.particles, **_settle(each, csd, replicate)})
+            rows.append({"engine": each.name, "particles": each.spec.particles, **settle_timed(each, csd, replicate)})
             last = rows[-1]
             report(f"{each.name} r{replicate}: {last['wall_s']:.1f} s, porosity {last['porosity']:.4f}")
     return pd.DataFrame(rows)
@@ -106,10 +110,25 @@ def warm_up(each: Contender, csd: CrystalSizeDistribution) -> None:
             settle(few, narrow, 0, Path(folder), engine=each.engine)
 
 
-def _settle(each: Contender, csd: CrystalSizeDistribution, replicate: int) -> dict[str, Any]:
-    """Time one packing; one that is not accepted is timed all the same, and says so."""
+def settle_timed(each: Contender, csd: CrystalSizeDistribution, replicate: int) -> dict[str, Any]:
+    """Time one packing; one that is not accepted is timed all the same, and says so.
+
+    Returns
+    -------
+    dict
+        replicate, wall_s, steps, status, porosity, porosity_from_floor, porosity_as_published, peak_memory_MB; the
+        porosities are blank where the engine itself failed.
+    """
+    started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
-        settled = settle(each.spec, csd, replicate, Path(folder), engine=each.engine)
+        try:
+            settled = settle(each.spec, csd, replicate, Path(folder), engine=each.engine)
+        except EngineMissing:
+            raise
+        except EngineError as error:
+            nothing = dict.fromkeys(POROSITIES, math.nan)
+            seconds = time.monotonic() - started
+            return {"replicate": replicate, "wall_s": seconds, "steps": 0, "status": str(error), **nothing}
     state, status = settled.state, "ok"
     try:
         accept(state, each.spec, settled.cloud, settled.rule)
@@ -122,6 +141,7 @@ def _settle(each: Contender, csd: CrystalSizeDistribution, replicate: int) -> di
         "steps": state.steps,
         "status": status,
         "porosity": found.interior,
+        "porosity_from_floor": found.from_floor,
         "porosity_as_published": found.as_published,
         "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE,
     }

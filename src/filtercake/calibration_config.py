@@ -15,8 +15,6 @@ from filtercake import contact
 from filtercake.calibration import Observation, Parameter, advised_friction
 from filtercake.calibration_study import BATCHES, Candidate, Settings
 from filtercake.config import (
-    DOUBTFUL_RELATIVE_OVERLAP,
-    LARGEST_RELATIVE_OVERLAP,
     NAME,
     TO_NUMBER,
     TO_WHOLE,
@@ -31,6 +29,7 @@ from filtercake.config import (
 from filtercake.config_loading import LoadedStudy, find_studies, load_study, parse, read_yaml
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
+from filtercake.fence import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
 from filtercake.measurements import Measurements, load_measurements
 from filtercake.resistance import implied_porosity
 from filtercake.study import expand

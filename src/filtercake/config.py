@@ -12,17 +12,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from filtercake import fence
+from filtercake.fence import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
 from filtercake.units import MICROSECOND
 
-LARGEST_RELATIVE_OVERLAP = 0.035
-"""Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
-DOUBTFUL_RELATIVE_OVERLAP = 0.01
-"""Contacts overlap by more than this share of the diameter: warned."""
-
-FRICTIONLESS_TIME_STEP = 0.36
-"""Default time step over the Rayleigh step at mu = 0."""
-FRICTIONAL_TIME_STEP = 0.2
-"""The same at mu > 0: rotation on several tangential springs is the fastest motion, and limits the step."""
+SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
+"""Properties a sweep may vary, besides the distribution."""
 
 NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 """What a study or a distribution may be called: it names files and folders."""
@@ -192,17 +187,21 @@ class Material(Model):
 class Packing(Model):
     """How the packings are made."""
 
-    particles: Annotated[int, Field(ge=50, le=2_000_000), TO_WHOLE] = Field(
-        default=2000, description="Spheres in one packing."
+    particles: Annotated[int, Field(ge=50, le=2_000_000), TO_WHOLE] | None = Field(
+        default=None,
+        description=(
+            "Spheres in one packing; if left out, 2000, or as many as make a bed of a broad distribution deep enough "
+            "(largest over smallest size above 4)."
+        ),
     )
     void_fraction: Annotated[float, Field(ge=0.5, le=0.95, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.65, description="Void fraction of the initial cloud; 0.65, or 0.60 for broad distributions."
     )
-    column_ratio: Annotated[float, Field(ge=0.5, le=10, allow_inf_nan=False), TO_NUMBER] = Field(
-        default=1.0,
+    column_ratio: Annotated[float, Field(ge=0.5, le=10, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None,
         description=(
             "Depth of the bed in units of its box side, over the paper's: fewer spheres make a bed as deep as a wider "
-            "one's."
+            "one's. If left out, 1, or chosen with particles."
         ),
     )
     settling_velocity_m_s: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
@@ -219,7 +218,15 @@ class Packing(Model):
         default=None, description="Time step, us; overrides time_step_rayleigh."
     )
     replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] = Field(
-        default=3, description="Packings per point, from different initial clouds."
+        default=3,
+        description="Packings per point, from different initial clouds; at least so many with porosity_interval.",
+    )
+    porosity_interval: Annotated[float, Field(ge=1e-4, le=0.1, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None,
+        description="Add packings until the half-width of the porosity's 95 % interval is at most this (6 at least).",
+    )
+    max_replicates: Annotated[int, Field(ge=2, le=1000), TO_WHOLE] = Field(
+        default=64, description="Packings per point after which porosity_interval gives up, and says so."
     )
     engine: EngineName = Field(default="auto", description="auto takes the best engine on this machine; or name one.")
     seed: Annotated[int, Field(ge=0), TO_WHOLE] = Field(default=1, description="Base seed of all random numbers.")
@@ -242,7 +249,7 @@ class Packing(Model):
 
     @model_validator(mode="after")
     def _as_published(self) -> Packing:
-        if self.engine == "liggghts_as_published" and self.column_ratio != 1.0:
+        if self.engine == "liggghts_as_published" and self.column_ratio not in (None, 1.0):
             raise ValueError("the engine liggghts_as_published has the paper's own box: column_ratio must be 1")
         return self
 
@@ -250,8 +257,7 @@ class Packing(Model):
         """Time step, s, from the Rayleigh time step (s) and the friction of a scene."""
         if self.time_step_us is not None:
             return self.time_step_us * MICROSECOND
-        default = FRICTIONAL_TIME_STEP if friction > 0.0 else FRICTIONLESS_TIME_STEP
-        return (self.time_step_rayleigh or default) * rayleigh
+        return (self.time_step_rayleigh or fence.default_time_step(friction)) * rayleigh
 
 
 class Sweep(Model):

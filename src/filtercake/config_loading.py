@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-import math
+import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,15 +12,13 @@ from typing import Any, TypeVar, get_args, get_origin
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from filtercake import contact
+from filtercake import contact, fence
 from filtercake.config import (
-    DOUBTFUL_RELATIVE_OVERLAP,
-    FRICTIONAL_TIME_STEP,
-    FRICTIONLESS_TIME_STEP,
-    LARGEST_RELATIVE_OVERLAP,
     NAME,
+    SWEPT,
     Crystallizer,
     Csd,
+    Packing,
     Study,
     Workflow,
 )
@@ -34,7 +32,7 @@ from filtercake.crystallizer import (
 )
 from filtercake.csd import CrystalSizeDistribution, mixture, read_csd, truncate
 from filtercake.errors import ConfigError, CrystallizerError, CsdError, Problem
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND, MINUTE
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
 
 LARGEST_FILE = 1_000_000
 """Bytes of a configuration file beyond which it is surely not one."""
@@ -151,7 +149,7 @@ def load_study(path: Path) -> LoadedStudy:
     problems += _stability_problems(model, csds, str(path))
     if problems:
         raise ConfigError(problems)
-    return LoadedStudy(path.stem, path, model, csds, tuple(_doubts(model, str(path))))
+    return LoadedStudy(path.stem, path, model, csds, tuple(_doubts(model, csds, str(path))))
 
 
 def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
@@ -393,65 +391,67 @@ def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
             yield Problem(file, key, repr(name), allowed)
 
 
-def _elastic_constants(model: Study, index: int) -> Iterable[tuple[float, float]]:
-    """Young's moduli (Pa) and Poisson's ratios that one sweep visits."""
-    sweep, material = model.sweeps[index], model.material
-    for modulus in sweep.youngs_modulus_MPa or [material.youngs_modulus_MPa]:
-        for poisson in sweep.poisson_ratio or [material.poisson_ratio]:
-            yield modulus * MEGAPASCAL, poisson
+def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str, tuple[str, float]], fence.Numbers]]:
+    """Every scene of a study as the fence sees it, with the keys and values that a finding may be about."""
+    packing, material = model.packing, model.material
+    for index, sweep in enumerate(model.sweeps):
+        axes = [_values(model, index, name) for name in SWEPT]
+        for name in sweep.csd or []:
+            if name not in csds:
+                continue
+            smallest = csds[name].truncated.smallest
+            for places in itertools.product(*axes):
+                where = dict(zip(SWEPT, places, strict=True))
+                value = {axis: number for axis, (_, number) in where.items()}
+                modulus, poisson = value["youngs_modulus_MPa"] * MEGAPASCAL, value["poisson_ratio"]
+                rayleigh = contact.rayleigh_time_step(0.5 * smallest, material.density, modulus, poisson)
+                step = packing.time_step(rayleigh, value["friction"])
+                keys = {"cohesion": where["cohesion_kJ_m3"], "time_step": _time_step_key(packing, step / rayleigh)}
+                yield (
+                    keys,
+                    fence.Numbers(
+                        smallest=smallest,
+                        density=material.density,
+                        youngs_modulus=modulus,
+                        poisson_ratio=poisson,
+                        restitution=value["restitution"],
+                        friction=value["friction"],
+                        cohesion=value["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
+                        time_step=step,
+                    ),
+                )
 
 
-def _cohesions(model: Study, index: int) -> Iterable[tuple[str, float]]:
-    given = model.sweeps[index].cohesion_kJ_m3
+def _time_step_key(packing: Packing, fraction: float) -> tuple[str, float]:
+    if packing.time_step_us is not None:
+        return "packing.time_step_us", packing.time_step_us
+    return "packing.time_step_rayleigh", fraction
+
+
+def _values(model: Study, index: int, name: str) -> list[tuple[str, float]]:
+    """Values of one property that a sweep visits, each with its key."""
+    given = getattr(model.sweeps[index], name)
     if given is None:
-        yield "material.cohesion_kJ_m3", model.material.cohesion_kJ_m3
-    else:
-        for j, value in enumerate(given):
-            yield f"sweeps[{index}].cohesion_kJ_m3[{j}]", value
+        return [(f"material.{name}", getattr(model.material, name))]
+    return [(f"sweeps[{index}].{name}[{j}]", value) for j, value in enumerate(given)]
 
 
 def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> list[Problem]:
-    """Cohesion over the limit where soft contacts turn the bed over, and time steps over the Rayleigh step."""
+    """Scenes outside the fence, one problem per key."""
     found: dict[str, Problem] = {}
-    for index, sweep in enumerate(model.sweeps):
-        for modulus, poisson in _elastic_constants(model, index):
-            limit = contact.cohesion_at_overlap(LARGEST_RELATIVE_OVERLAP, modulus, poisson) / KILOJOULE_PER_M3
-            for key, cohesion in _cohesions(model, index):
-                if cohesion > limit:
-                    found[key] = Problem(file, key, f"{cohesion:g}", _over_cohesion(limit, modulus, poisson))
-            step_us = model.packing.time_step_us
-            for name in (sweep.csd or []) if step_us is not None else []:
-                if name not in csds:
-                    continue
-                rayleigh = contact.rayleigh_time_step(
-                    0.5 * csds[name].truncated.smallest, model.material.density, modulus, poisson
-                )
-                if step_us is not None and step_us * MICROSECOND >= rayleigh:
-                    allowed = (
-                        f"must be below the Rayleigh time step {rayleigh / MICROSECOND:.4g} us of {name}; leave it out "
-                        f"for {FRICTIONLESS_TIME_STEP:g} of that (without friction) or {FRICTIONAL_TIME_STEP:g} (with)"
-                    )
-                    found["packing.time_step_us"] = Problem(file, "packing.time_step_us", f"{step_us:g}", allowed)
+    for keys, scene in _scenes(model, csds):
+        for finding in fence.refusals(scene):
+            key, value = keys[finding.key]
+            found.setdefault(key, Problem(file, key, f"{value:g}", finding.text))
     return list(found.values())
 
 
-def _over_cohesion(limit: float, modulus: float, poisson: float) -> str:
-    return (
-        f"must be at most {math.floor(limit)} kJ/m3 at E = {modulus / MEGAPASCAL:g} MPa, nu = {poisson:g}: above it, "
-        f"contacts overlap by more than {LARGEST_RELATIVE_OVERLAP:.1%} of the diameter; use a larger youngs_modulus_MPa"
-    )
-
-
-def _doubts(model: Study, file: str) -> Iterable[str]:
-    """Warnings: allowed, but the answer depends on the softness of the contacts."""
+def _doubts(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterable[str]:
+    """Warnings: allowed, but the answer depends on a choice of numbers."""
     seen = set()
-    for index in range(len(model.sweeps)):
-        for modulus, poisson in _elastic_constants(model, index):
-            for key, cohesion in _cohesions(model, index):
-                overlap = contact.relative_overlap(cohesion * KILOJOULE_PER_M3, modulus, poisson)
-                if overlap > DOUBTFUL_RELATIVE_OVERLAP and key not in seen:
-                    seen.add(key)
-                    yield (
-                        f"{file}: {key} = {cohesion:g}: contacts overlap by {overlap:.1%} of the diameter, which alone "
-                        f"lowers the porosity by about {3 * 0.65 * overlap:.3f}"
-                    )
+    for keys, scene in _scenes(model, csds):
+        for finding in fence.doubts(scene):
+            key, value = keys[finding.key]
+            if key not in seen:
+                seen.add(key)
+                yield f"{file}: {key} = {value:g}: {finding.text}"

@@ -7,12 +7,11 @@ from collections.abc import Iterable
 from filtercake.config_loading import LoadedStudy
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
+from filtercake.packing.cloud import NARROW
 from filtercake.packing.engines import ENGINES
 
 SMALL_BED = 10_000
 """Spheres up to which LIGGGHTS is taken whatever the width of the distribution."""
-NARROW = 4.0
-"""Ratio of the largest to the smallest size up to which LIGGGHTS is taken whatever the number of spheres."""
 
 
 def choose(csd: CrystalSizeDistribution, particles: int) -> str:

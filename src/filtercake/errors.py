@@ -58,11 +58,14 @@ class EngineError(FiltercakeError):
     ----------
     transient : bool
         True where the same packing may well succeed when tried again (killed, truncated output, time limit).
+    outcome : {"refused", "exploded", "unsettled"}
+        What became of the bed: the engine would not start it, it flew apart, or it did not come to rest in time.
     """
 
-    def __init__(self, message: str, *, transient: bool = False):
+    def __init__(self, message: str, *, transient: bool = False, outcome: str = "refused"):
         super().__init__(message)
         self.transient = transient
+        self.outcome = outcome
 
 
 class EngineMissing(EngineError):  # noqa: N818 - reads better than EngineMissingError where it is caught
@@ -70,11 +73,22 @@ class EngineMissing(EngineError):  # noqa: N818 - reads better than EngineMissin
 
 
 class PackingRejected(FiltercakeError):  # noqa: N818
-    """A packing ran but is not acceptable; the text lists every reason."""
+    """A packing ran but is not acceptable; the text lists every reason.
 
-    def __init__(self, reasons: Sequence[str], *, transient: bool = False):
+    Attributes
+    ----------
+    reasons : tuple of str
+        Every reason.
+    transient : bool
+        As for :class:`EngineError`.
+    outcome : {"refused", "exploded", "unsettled"}
+        As for :class:`EngineError`.
+    """
+
+    def __init__(self, reasons: Sequence[str], *, transient: bool = False, outcome: str = "refused"):
         self.reasons = tuple(reasons)
         self.transient = transient
+        self.outcome = outcome
         super().__init__("; ".join(self.reasons))
 
 

@@ -11,28 +11,25 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from filtercake import contact
-from filtercake.config import Study, Sweep
+from filtercake.config import SWEPT, Packing, Study, Sweep
 from filtercake.config_loading import LoadedStudy
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import PackingRejected
+from filtercake.packing.cloud import BedSize, bed_for
 from filtercake.packing.pack import MANIFEST, Outcome
-from filtercake.packing.result import Packing, read_record
+from filtercake.packing.result import Packing as SettledPacking
+from filtercake.packing.result import read_record
 from filtercake.packing.spec import PackingSpec, digest
 from filtercake.porosity import measure
+from filtercake.precision import half_width
 from filtercake.resistance import carman_sauter, kozeny_carman
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
 
-CONFIDENCE = 0.95
-
-SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
-"""Properties a sweep may vary, besides the distribution."""
-
 MEASURED = ("porosity", "porosity_as_published", "resistance_m_kg", "resistance_sauter_m_kg")
 
-POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", *SWEPT, "engine")
+POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", *SWEPT, "engine", "porosity_interval_asked")
 REPLICATE_COLUMNS = (
     *POINT_COLUMNS,
     "replicate",
@@ -55,6 +52,7 @@ SUMMARY_COLUMNS = (
     *POINT_COLUMNS,
     "n",
     "n_failed",
+    "interval_reached",
     "porosity",
     "porosity_ci95",
     "porosity_as_published",
@@ -82,9 +80,13 @@ class Point:
     residence_time_min : float or None
         Residence time of the crystallizer, where one made the distribution.
     replicates : int
-        Packings asked for.
+        Packings asked for; at least so many where an interval is asked for.
     spec : PackingSpec
         What is packed.
+    porosity_interval : float or None
+        Half-width of the porosity's 95 % interval, down to which packings are added.
+    max_replicates : int
+        Packings after which that ends.
     """
 
     name: str
@@ -93,6 +95,13 @@ class Point:
     residence_time_min: float | None
     replicates: int
     spec: PackingSpec
+    porosity_interval: float | None = None
+    max_replicates: int = 0
+
+    @property
+    def most_replicates(self) -> int:
+        """Packings that are made at most."""
+        return self.replicates if self.porosity_interval is None else max(self.replicates, self.max_replicates)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, fit for JSON and a rule's params."""
@@ -116,6 +125,7 @@ class Point:
             "restitution": self.spec.restitution,
             "youngs_modulus_MPa": _tidy(self.spec.youngs_modulus / MEGAPASCAL),
             "engine": self.spec.engine,
+            "porosity_interval_asked": np.nan if self.porosity_interval is None else self.porosity_interval,
         }
 
 
@@ -154,13 +164,24 @@ def base_point(study: LoadedStudy, csd: str, choose_engine: Callable[[CrystalSiz
     return _point(study, csd, base, study.model.packing.replicates, choose_engine)
 
 
+def bed_of(settings: Packing, csd: CrystalSizeDistribution) -> BedSize:
+    """Size of the beds of a (truncated) distribution: what the study says, or what the distribution needs."""
+    if settings.particles is not None:
+        return BedSize(settings.particles, settings.column_ratio or 1.0)
+    chosen = bed_for(csd, settings.void_fraction)
+    one_shape = settings.engine == "liggghts_as_published"
+    return BedSize(chosen.particles, settings.column_ratio or (1.0 if one_shape else chosen.column_ratio))
+
+
 def points_table(points: Iterable[Point]) -> pd.DataFrame:
     """Tabulate points: ``POINT_COLUMNS`` and the replicates asked for."""
     rows = [{**point.row(), "replicates": point.replicates} for point in points]
     return pd.DataFrame(rows, columns=[*POINT_COLUMNS, "replicates"])
 
 
-def replicate_row(point: Point, packing: Packing, csd: CrystalSizeDistribution, sphericity: float) -> dict[str, Any]:
+def replicate_row(
+    point: Point, packing: SettledPacking, csd: CrystalSizeDistribution, sphericity: float
+) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
     Parameters
@@ -230,29 +251,12 @@ def replicates_table(
                 rows.append(failed_row(point, outcome, outcome.reason))
                 continue
             try:
-                packing = Packing.load(folder / f"r{outcome.replicate}.npz")
+                packing = SettledPacking.load(folder / f"r{outcome.replicate}.npz")
             except PackingRejected as error:
                 rows.append(failed_row(point, outcome, str(error)))
                 continue
             rows.append(replicate_row(point, packing, csds[point.csd], sphericity))
     return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
-
-
-def half_width(values: np.ndarray[Any, np.dtype[np.float64]], confidence: float = CONFIDENCE) -> float:
-    """Half-width of the Student t confidence interval of a mean; nan for fewer than two values.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Independent values.
-    confidence : float
-        Confidence level.
-    """
-    n = values.size
-    if n < 2:
-        return float("nan")
-    quantile = float(stats.t.ppf(0.5 + confidence / 2.0, n - 1))
-    return quantile * float(np.std(values, ddof=1)) / float(np.sqrt(n))
 
 
 def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
@@ -269,10 +273,18 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
             values = good[column].to_numpy(np.float64)
             row[column] = values.mean() if values.size else np.nan
             row[_interval_name(column)] = half_width(values)
+        row["interval_reached"] = _reached(row["porosity_ci95"], row["porosity_interval_asked"])
         row["soft_contact_compaction"] = good["soft_contact_compaction"].mean()
         row["overlap_max"] = good["overlap_max"].max()
         rows.append(row)
     return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
+
+
+def _reached(half: float, asked: float) -> str:
+    """Say whether an interval is as narrow as asked; nothing where none was asked for."""
+    if np.isnan(asked):
+        return ""
+    return "yes" if half <= asked else "no"
 
 
 def base_rows(study: Study, table: pd.DataFrame, free: Collection[str] = ()) -> pd.DataFrame:
@@ -314,11 +326,12 @@ def _point(
     csd = study.csds[csd_name].truncated
     modulus, poisson = swept["youngs_modulus_MPa"] * MEGAPASCAL, swept["poisson_ratio"]
     rayleigh = contact.rayleigh_time_step(0.5 * csd.smallest, material.density, modulus, poisson)
-    engine = settings.engine if settings.engine != "auto" else choose_engine(csd, settings.particles)
+    bed = bed_of(settings, csd)
+    engine = settings.engine if settings.engine != "auto" else choose_engine(csd, bed.particles)
     spec = PackingSpec(
-        particles=settings.particles,
+        particles=bed.particles,
         void_fraction=settings.void_fraction,
-        column_ratio=settings.column_ratio,
+        column_ratio=bed.column_ratio,
         settling_velocity=settings.settling_velocity_m_s,
         density=material.density,
         youngs_modulus=modulus,
@@ -336,8 +349,16 @@ def _point(
         time_limit=settings.time_limit_min * MINUTE,
         write_vtk=settings.write_vtk,
     )
-    residence_time = study.model.csds[csd_name].residence_time_min
-    return Point(_slug(csd_name, swept, study.model, spec, csd), study.name, csd_name, residence_time, replicates, spec)
+    return Point(
+        name=_slug(csd_name, swept, study.model, spec, csd),
+        study=study.name,
+        csd=csd_name,
+        residence_time_min=study.model.csds[csd_name].residence_time_min,
+        replicates=replicates,
+        spec=spec,
+        porosity_interval=settings.porosity_interval,
+        max_replicates=settings.max_replicates,
+    )
 
 
 def _slug(csd_name: str, swept: dict[str, float], study: Study, spec: PackingSpec, csd: CrystalSizeDistribution) -> str:

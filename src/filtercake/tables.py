@@ -13,7 +13,7 @@ from filtercake.drum_filter import Cake, DrumFilter, area, design_table
 from filtercake.errors import FilterError
 from filtercake.packing.cloud import box_length
 from filtercake.resistance import kozeny_carman
-from filtercake.study import base_rows
+from filtercake.study import base_rows, bed_of
 from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
 
 Csds = dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
@@ -47,16 +47,17 @@ def table1(study: Study, csds: Csds) -> pd.DataFrame:
     rows = []
     for name, (_, truncated) in csds.items():
         published = published_value(study, name, "system_dimension_um", "simulation")
-        particles = published.particles if published and published.particles else study.packing.particles
+        bed = bed_of(study.packing, truncated)
+        particles = published.particles if published and published.particles else bed.particles
         length, same = (
             box_length(truncated, n, study.packing.void_fraction, ratio) / MICROMETRE
-            for n, ratio in ((study.packing.particles, study.packing.column_ratio), (particles, 1.0))
+            for n, ratio in ((bed.particles, bed.column_ratio), (particles, 1.0))
         )
         rows.append(
             {
                 "csd": name,
                 "label": study.csds[name].label or name,
-                "particles": study.packing.particles,
+                "particles": bed.particles,
                 "void_fraction": study.packing.void_fraction,
                 "system_dimension_um": round(length, 2),
                 "published_um": _value(published),

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from filtercake import contact
-from filtercake.config import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
 from filtercake.csd import mixture
 from filtercake.errors import PackingRejected
+from filtercake.fence import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
 from filtercake.packing.pack import pack
 from filtercake.packing.spec import PackingSpec
 

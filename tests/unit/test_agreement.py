@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from filtercake.agreement import compare_sizes
-from filtercake.study import SWEPT, half_width
+from filtercake.config import SWEPT
+from filtercake.precision import half_width
 
 BASE = dict(zip(SWEPT, (50.0, 0.0, 0.2, 0.3, 5.0), strict=True))
 

@@ -39,7 +39,7 @@ from filtercake.figures.calibrated import (
 from filtercake.figures.calibration_objective import THRESHOLD, stretches
 from filtercake.figures.catalogue import save
 from filtercake.measurements import load_measurements
-from filtercake.study import half_width
+from filtercake.precision import half_width
 
 pytestmark = pytest.mark.filterwarnings("error")
 

@@ -15,7 +15,8 @@ from filtercake import engine_choice
 from filtercake.config import Study, Workflow
 from filtercake.config_loading import find_studies, load_studies, load_study, load_workflow, read_yaml
 from filtercake.errors import ConfigError, Problem
-from filtercake.study import expand
+from filtercake.packing.cloud import BedSize
+from filtercake.study import bed_of, expand
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -50,7 +51,7 @@ def with_packing(study: str, line: str) -> str:
 def test_a_small_study_gets_the_defaults(study_from) -> None:
     study = study_from()
     assert study.name == "study"
-    assert study.model.packing.particles == 2000
+    assert bed_of(study.model.packing, study.csds["bimodal"].truncated) == BedSize(2000, 1.0)
     assert study.model.packing.void_fraction == 0.65
     assert study.model.packing.write_vtk is False
     assert study.model.material.cohesion_kJ_m3 == 50.0
@@ -253,7 +254,7 @@ BROKEN: list[tuple[Any, ...]] = [
         "density_kg_m3: 1180\n  cohesion_kJ_m3: 300",
         "material.cohesion_kJ_m3",
         "300",
-        "overlap by more than 3.5% of the diameter; use a larger youngs_modulus_MPa",
+        "overlap by more than 3.5% of the diameter (docs/stability.md); use a larger youngs_modulus_MPa",
         id="base cohesion over the limit",
     ),
     pytest.param(
@@ -295,8 +296,8 @@ def test_a_wrong_value_is_named(
         ("time_step_rayleigh: 1.5", "time_step_rayleigh", "1.5", "must be less than 1"),
         ("time_step_us: 0", "time_step_us", "0", "must be greater than 0"),
         # pi 10e-6 sqrt(1180/(5e6/2.4))/(0.1631*0.2 + 0.8766) = 0.8223 us
-        ("time_step_us: 0.9", "time_step_us", "0.9", "must be below the Rayleigh time step 0.8223 us of bimodal"),
-        ("time_step_us: 8e2", "time_step_us", "800", "must be below the Rayleigh time step 0.8223 us of bimodal"),
+        ("time_step_us: 0.9", "time_step_us", "0.9", "must be below the Rayleigh time step 0.8223 us (docs/stability.md)"),
+        ("time_step_us: 8e2", "time_step_us", "800", "must be below the Rayleigh time step 0.8223 us (docs/stability.md)"),
         ("replicates: 0", "replicates", "0", "must be greater than or equal to 1"),
         ("engine: lammps", "engine", "'lammps'", "allowed: 'auto', 'liggghts'"),
         ("seed: -1", "seed", "-1", "must be greater than or equal to 0"),

@@ -22,8 +22,9 @@ from filtercake.figures.catalogue import FIGURES, StudyData, draw, save
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import Slab, bed_height, interior_slab
 from filtercake.porosity import slab_porosity
+from filtercake.precision import half_width
 from filtercake.resistance import carman_sauter, kozeny_carman
-from filtercake.study import REPLICATE_COLUMNS, half_width, summarise
+from filtercake.study import REPLICATE_COLUMNS, summarise
 
 pytestmark = pytest.mark.filterwarnings("error")
 

@@ -22,6 +22,7 @@ from filtercake.csd import from_table, mixture, to_table
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed
 from filtercake.packing.result import Packing, write_json
 from filtercake.packing.spec import PackingSpec, digest, stage_seed
+from filtercake.precision import half_width
 from filtercake.resistance import carman_sauter, kozeny_carman
 from filtercake.study import (
     POINT_COLUMNS,
@@ -29,7 +30,6 @@ from filtercake.study import (
     SUMMARY_COLUMNS,
     Point,
     expand,
-    half_width,
     points_table,
     replicates_table,
     summarise,

@@ -23,6 +23,8 @@ rule packing:
     params:
         spec=lambda wildcards: point_of(wildcards).spec.as_dict(),
         replicates=lambda wildcards: point_of(wildcards).replicates,
+        most=lambda wildcards: point_of(wildcards).most_replicates,
+        interval=lambda wildcards: point_of(wildcards).porosity_interval,
     message:
         "packing {wildcards.point}"
     script:

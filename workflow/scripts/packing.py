@@ -8,10 +8,11 @@ from filtercake.csd import from_table
 from filtercake.job import Progress, job
 from filtercake.packing.pack import pack_replicates
 from filtercake.packing.spec import PackingSpec
+from filtercake.precision import UntilNarrow
 from filtercake.provenance import code_hash
 
 
-def main(table, sources, spec, replicates, manifest, point, logger):
+def main(table, sources, spec, asked, manifest, point, logger):
     """Pack and report each replicate as it comes."""
     progress = Progress()
 
@@ -29,7 +30,11 @@ def main(table, sources, spec, replicates, manifest, point, logger):
 
     _, truncated = from_table(pd.read_csv(table))
     code = code_hash([Path(source) for source in sources])
-    pack_replicates(PackingSpec.from_dict(spec), truncated, replicates, Path(manifest).parent, code, report, note)
+    spec = PackingSpec.from_dict(spec)
+    enough = UntilNarrow(spec, asked.interval, asked.replicates) if asked.interval else lambda _: False
+    pack_replicates(spec, truncated, asked.most, Path(manifest).parent, code, report, note, enough)
+    if asked.interval:
+        note(f"interval {enough.half_width:.2g} after {len(enough.values)} packings, {asked.interval:g} asked for")
 
 
 with job(snakemake.log[0]) as log:
@@ -37,7 +42,7 @@ with job(snakemake.log[0]) as log:
         snakemake.input.csd,
         [*snakemake.input.library, *snakemake.input.templates],
         snakemake.params.spec,
-        snakemake.params.replicates,
+        snakemake.params,
         snakemake.output[0],
         snakemake.wildcards.point,
         log,

@@ -18,7 +18,7 @@ from scipy import stats
 
 from filtercake.calibration import CONFIDENCE
 from filtercake.measurements import Measurements, compressibility_by_csd
-from filtercake.study import half_width
+from filtercake.precision import half_width
 
 if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
     from matplotlib.figure import Figure

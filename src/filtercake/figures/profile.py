@@ -13,7 +13,7 @@ from filtercake.figures import selection, style
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import bed_height, interior_slab
 from filtercake.porosity import porosity_profile
-from filtercake.study import half_width
+from filtercake.precision import half_width
 from filtercake.units import MICROMETRE, FloatArray
 
 if TYPE_CHECKING:

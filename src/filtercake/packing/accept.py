@@ -62,8 +62,9 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
     """
     reasons = _incomplete(state, cloud)
     if reasons:  # geometry that is not whole cannot be measured
-        raise PackingRejected(reasons, transient=True)
-    reasons += _outside(state, cloud)
+        raise PackingRejected(reasons, transient=True, outcome="exploded")
+    outside = _outside(state, cloud)
+    reasons += outside
     contacts = find_contacts(state.position, state.radius, state.length)
     deepest = _deepest(state, contacts)
     limit = overlap_limit(spec, cloud.radius)
@@ -72,7 +73,8 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
             f"largest overlap {deepest:.3g} of the smaller diameter is over its limit {limit:.3g}: "
             "the contacts are too soft or the time step too long"
         )
-    if not is_settled(state, rule):
+    settled = is_settled(state, rule)
+    if not settled:
         reasons.append(f"not settled after {state.steps:,} steps: {_why_unsettled(state)}")
     if state.dangerous_builds and _keeps_the_rule(state):
         reasons.append(f"{state.dangerous_builds} neighbour lists were built late; use a larger skin_um")
@@ -80,7 +82,7 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
     if too_thin:
         reasons.append(too_thin)
     if reasons:
-        raise PackingRejected(reasons)
+        raise PackingRejected(reasons, outcome="exploded" if outside else "refused" if settled else "unsettled")
     return measurements(state, contacts, deepest)
 
 

@@ -18,6 +18,15 @@ MAX_ATTEMPTS = 4_000_000
 PLACEMENT_HEIGHT = 2.0
 """Height of the region the spheres start in, in units of the box length L (paper, section 3.1)."""
 
+NARROW = 4.0
+"""Largest over smallest size up to which a distribution counts as narrow."""
+NARROW_PARTICLES = 2000
+"""Spheres in a bed of a narrow distribution (paper, Table 3)."""
+WIDTH_DIAMETERS, DEPTH_DIAMETERS = 4.6, 10.0
+"""Width of the box and depth of the settled bed of a broad distribution, in largest diameters."""
+SETTLED_POROSITY = 0.3
+"""Rough porosity of such a bed, for its depth only."""
+
 
 @dataclass(frozen=True)
 class Cloud:
@@ -80,6 +89,35 @@ def box_length(csd: CrystalSizeDistribution, particles: int, void_fraction: floa
     """
     solids = particles * csd.mean_particle_volume
     return float((solids / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * column_ratio)) ** (1.0 / 3.0))
+
+
+@dataclass(frozen=True)
+class BedSize:
+    """How large a bed of a distribution has to be."""
+
+    particles: int
+    column_ratio: float
+
+
+def bed_for(csd: CrystalSizeDistribution, void_fraction: float) -> BedSize:
+    """Choose the size of a bed: the paper's 2000 spheres, or a column of a broad distribution deep enough.
+
+    A packing is looser for two to three largest diameters under its surface, and its small spheres must be many around
+    each large one. A broad distribution's bed is as deep as the paper's of 100 000 crystals, in a narrower box.
+
+    Parameters
+    ----------
+    csd : CrystalSizeDistribution
+        The (truncated) distribution.
+    void_fraction : float
+        Void fraction of the initial cloud.
+    """
+    if csd.largest <= NARROW * csd.smallest:
+        return BedSize(NARROW_PARTICLES, 1.0)
+    width, depth = WIDTH_DIAMETERS * csd.largest, DEPTH_DIAMETERS * csd.largest
+    solids = width**2 * depth * (1.0 - SETTLED_POROSITY)
+    column_ratio = depth * (1.0 - SETTLED_POROSITY) / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * width)
+    return BedSize(max(NARROW_PARTICLES, math.ceil(solids / csd.mean_particle_volume)), round(column_ratio, 3))
 
 
 def make_cloud(

@@ -162,6 +162,7 @@ def pack_replicates(
     code: str,
     report: Callable[[Outcome, dict[str, Any]], None] = lambda _outcome, _record: None,
     progress: Report = lambda _: None,
+    enough: Callable[[Path], bool] = lambda _: False,
 ) -> list[Outcome]:
     """Make a point's replicates in ``folder`` and write their manifest last.
 
@@ -173,7 +174,7 @@ def pack_replicates(
     spec, csd
         As for :func:`pack`.
     replicates : int
-        How many.
+        How many, at most.
     folder : Path
         Receives r<k>.npz, r<k>.json and the manifest.
     code : str
@@ -182,6 +183,8 @@ def pack_replicates(
         Called with every outcome and its record as it comes.
     progress : callable
         Takes a line about a long packing.
+    enough : callable
+        Called with the geometry file of every accepted packing; says whether no further one is needed.
 
     Raises
     ------
@@ -200,6 +203,8 @@ def pack_replicates(
             outcome, record = _attempt(spec, csd, replicate, npz, key, engine, work, progress)
         report(outcome, record)
         outcomes.append(outcome)
+        if outcome.status == "ok" and enough(npz):
+            break
     shutil.rmtree(work, ignore_errors=True)
     write_json(folder / MANIFEST, {"key": key, "replicates": [vars(outcome) for outcome in outcomes]})
     return outcomes

@@ -89,12 +89,14 @@ class _Run:
             self.work += self.bed.count * rule.check_steps
             self.records.append(self.bed.record())
             if not all(map(math.isfinite, self.records[-1])):
-                raise EngineError("the bed exploded: positions are no longer finite; use a shorter time step")
+                raise EngineError(
+                    "the bed exploded: positions are no longer finite; use a shorter time step", outcome="exploded"
+                )
             now = time.monotonic()
             if 0.0 < spec.time_limit < now - self.started:
                 self._save()
                 limit = f"time limit of {spec.time_limit:g} s reached; the packing was stopped"
-                raise EngineError(limit, transient=True)
+                raise EngineError(limit, transient=True, outcome="unsettled")
             if now - self.saved > STATE_SECONDS:
                 self._save()
             if now - self.reported > PROGRESS_SECONDS:

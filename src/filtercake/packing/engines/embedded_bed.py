@@ -319,7 +319,10 @@ class Bed:
         self.position[:n, :2] %= self.length
         top = float(self.position[:n, 2].max())
         if not top < self.ceiling:
-            raise EngineError("the bed exploded: spheres fly far above where they started; use a shorter time step")
+            raise EngineError(
+                "the bed exploded: spheres fly far above where they started; use a shorter time step",
+                outcome="exploded",
+            )
         cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
         top = max(top, 0.0)
         order = kernels.sort_in_space(self.spheres[:n], float(self.largest[0]), self.length, top)

@@ -17,6 +17,7 @@ from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import micro, process
 from filtercake.packing.engines.base import SettleRequest, parallelism
 from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
+from filtercake.packing.engines.micro import UnitSystem
 from filtercake.packing.result import SettledState
 from filtercake.packing.settling import WINDOW
 from filtercake.packing.spec import PackingSpec
@@ -28,6 +29,8 @@ TEMPLATE_FOLDER_VARIABLE = "FILTERCAKE_TEMPLATES"
 PROGRESS_SECONDS = 20.0
 LOOK_SECONDS = 5.0
 
+_BLOWN_UP = ("Lost atoms", "Non-numeric", "out of range", "Out of range", "neighbor list", "Bond atoms missing")
+"""Words of LIGGGHTS's errors about spheres that fly apart, not about its input."""
 _COLUMNS = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
 
 
@@ -51,9 +54,18 @@ class Liggghts:
     name = "liggghts"
     template = "packing.in.j2"
 
-    def __init__(self, *, force_tangential: bool = False):
-        """Create the engine; ``force_tangential`` keeps the tangential part at mu = 0 (to prove it does nothing)."""
+    def __init__(self, *, force_tangential: bool = False, units: UnitSystem = micro.MICRO):
+        """Create the engine.
+
+        Parameters
+        ----------
+        force_tangential : bool
+            Keep the tangential part at mu = 0 (to prove that it does nothing).
+        units : UnitSystem
+            Units of the deck.
+        """
         self.force_tangential = force_tangential
+        self.units = units
 
     def why_missing(self) -> str | None:
         """Say why LIGGGHTS cannot run here, None where it can."""
@@ -69,18 +81,18 @@ class Liggghts:
 
     def settle(self, request: SettleRequest) -> SettledState:
         """Run LIGGGHTS on the request's cloud (see :class:`filtercake.packing.engines.base.Engine`)."""
-        write_cloud(request.cloud, request.spec.density, request.folder / "cloud.data")
+        write_cloud(request.cloud, request.spec.density, request.folder / "cloud.data", self.units)
         return self._run(request, self._deck_values(request), expected=request.cloud.radius.size)
 
     def _deck_values(self, request: SettleRequest) -> dict[str, Any]:
         spec, rule = request.spec, request.rule
         return {
-            **_material_values(spec),
+            **material_values(spec, self.units),
             "contact_model": contact_model(spec.friction > 0.0 or self.force_tangential, spec.cohesion > 0.0),
             "tangential": spec.friction > 0.0 or self.force_tangential,
             "cloud_file": "cloud.data",
-            "length": micro.number(request.cloud.length / micro.LENGTH),
-            "skin": micro.number((spec.skin or default_skin(request.cloud)) / micro.LENGTH),
+            "length": micro.number(request.cloud.length / self.units.length),
+            "skin": micro.number((spec.skin or default_skin(request.cloud)) / self.units.length),
             "check_steps": rule.check_steps,
             "max_checks": rule.max_checks,
             "calm_checks": rule.calm_checks,
@@ -100,7 +112,7 @@ class Liggghts:
         wall_time = time.monotonic() - started
         log = parse_log(screen.read_text(encoding="utf-8", errors="replace"))
         check_end(status, log)
-        position, velocity, radius = read_dump(folder / "final.dump")
+        position, velocity, radius = read_dump(folder / "final.dump", self.units)
         length = request.cloud.length
         position[:, :2] %= length
         return SettledState(
@@ -108,7 +120,7 @@ class Liggghts:
             velocity=velocity,
             radius=radius,
             length=length,
-            trajectory=trajectory(log, spec.time_step, length, spec.density),
+            trajectory=trajectory(log, spec.time_step, length, spec.density, self.units),
             steps=log.finished_step or 0,
             expected=expected if expected is not None else (log.inserted or 0),
             dangerous_builds=log.dangerous_builds,
@@ -198,16 +210,16 @@ def command(process_count: int) -> list[str]:
     return [*launcher, "stdbuf", "-o0", executable, "-echo", "screen", "-log", "none", "-in", "packing.in"]
 
 
-def write_cloud(cloud: Cloud, density: float, path: Path) -> None:
-    """Write a cloud as a LIGGGHTS data file in micro units, in a box twice as high.
+def write_cloud(cloud: Cloud, density: float, path: Path, units: UnitSystem = micro.MICRO) -> None:
+    """Write a cloud as a LIGGGHTS data file, in a box twice as high.
 
     Small spheres are thrown up when large ones land; what leaves the box is lost.
     """
     margin = float(cloud.radius.max())
-    lo, hi = micro.number(-margin / micro.LENGTH), micro.number((2.0 * cloud.height + margin) / micro.LENGTH)
-    side = micro.number(cloud.length / micro.LENGTH)
+    lo, hi = micro.number(-margin / units.length), micro.number((2.0 * cloud.height + margin) / units.length)
+    side = micro.number(cloud.length / units.length)
     header = (
-        f"initial cloud, units micro\n\n{cloud.radius.size} atoms\n1 atom types\n\n"
+        f"initial cloud, units {units.name}\n\n{cloud.radius.size} atoms\n1 atom types\n\n"
         f"0 {side} xlo xhi\n0 {side} ylo yhi\n{lo} {hi} zlo zhi\n\nAtoms\n\n"
     )
     n = cloud.radius.size
@@ -215,9 +227,9 @@ def write_cloud(cloud: Cloud, density: float, path: Path) -> None:
         [
             np.arange(1, n + 1),
             np.ones(n),
-            2.0 * cloud.radius / micro.LENGTH,
-            np.full(n, density / micro.DENSITY),
-            cloud.position / micro.LENGTH,
+            2.0 * cloud.radius / units.length,
+            np.full(n, density / units.density),
+            cloud.position / units.length,
         ]
     )
     with path.open("w", encoding="ascii") as stream:
@@ -225,7 +237,7 @@ def write_cloud(cloud: Cloud, density: float, path: Path) -> None:
         np.savetxt(stream, rows, fmt=["%d", "%d", "%.17g", "%.17g", "%.17g", "%.17g", "%.17g"])
 
 
-def read_dump(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
+def read_dump(path: Path, units: UnitSystem = micro.MICRO) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Read the final dump: positions (n, 3) m, velocities (n, 3) m/s, radii (n,) m, sorted by atom number.
 
     Raises
@@ -251,7 +263,7 @@ def read_dump(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
     if np.unique(table[:, 0]).size != promised:
         raise EngineError("the final dump holds an atom twice", transient=True)
     table = table[np.argsort(table[:, 0])]
-    return table[:, 2:5] * micro.LENGTH, table[:, 5:8] * micro.VELOCITY, table[:, 8] * micro.LENGTH
+    return table[:, 2:5] * units.length, table[:, 5:8] * units.velocity, table[:, 8] * units.length
 
 
 def check_end(status: int, log: LiggghtsLog) -> None:
@@ -265,9 +277,11 @@ def check_end(status: int, log: LiggghtsLog) -> None:
         In LIGGGHTS's own words where it has any.
     """
     if log.error is not None:
-        raise EngineError(f"LIGGGHTS: {log.error}")
+        blown = any(word in log.error for word in _BLOWN_UP)
+        raise EngineError(f"LIGGGHTS: {log.error}", outcome="exploded" if blown else "refused")
     if status < 0:
-        raise EngineError(f"LIGGGHTS was killed by signal {-status}", transient=True)
+        # a bed that flies apart may end in a crash as well
+        raise EngineError(f"LIGGGHTS was killed by signal {-status}", transient=True, outcome="exploded")
     if log.forced_end:
         raise EngineError("LIGGGHTS was asked to stop by a signal before the bed was at rest", transient=True)
     if status != 0:
@@ -279,17 +293,19 @@ def check_end(status: int, log: LiggghtsLog) -> None:
         )
 
 
-def _material_values(spec: PackingSpec) -> dict[str, Any]:
+def material_values(spec: PackingSpec, units: UnitSystem) -> dict[str, Any]:
+    """Return what every deck says of material and protocol, in its units."""
     return {
+        "units": units.name,
         "engine_seed": spec.seed,
-        "youngs_modulus": micro.number(spec.youngs_modulus / micro.PRESSURE),
+        "youngs_modulus": micro.number(spec.youngs_modulus / units.pressure),
         "poisson_ratio": micro.number(spec.poisson_ratio),
         "restitution": micro.number(spec.restitution),
         "friction": micro.number(spec.friction),
-        "cohesion": micro.number(spec.cohesion / micro.PRESSURE),
+        "cohesion": micro.number(spec.cohesion / units.pressure),
         "cohesive": spec.cohesion > 0.0,
-        "density": micro.number(spec.density / micro.DENSITY),
-        "gravity": micro.number(GRAVITY / micro.ACCELERATION),
-        "time_step": micro.number(spec.time_step / micro.TIME),
-        "settling_velocity": micro.number(spec.settling_velocity / micro.VELOCITY),
+        "density": micro.number(spec.density / units.density),
+        "gravity": micro.number(GRAVITY / units.acceleration),
+        "time_step": micro.number(spec.time_step / units.time),
+        "settling_velocity": micro.number(spec.settling_velocity / units.velocity),
     }

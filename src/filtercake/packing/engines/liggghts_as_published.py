@@ -6,7 +6,7 @@ from typing import Any
 
 from filtercake.packing.engines import micro
 from filtercake.packing.engines.base import SettleRequest
-from filtercake.packing.engines.liggghts import Liggghts, _material_values
+from filtercake.packing.engines.liggghts import Liggghts, material_values
 from filtercake.packing.result import SettledState
 
 STEPS = 150_000
@@ -37,16 +37,16 @@ def _published_values(request: SettleRequest, steps: int) -> dict[str, Any]:
     seeds = prime_seeds(request.seed, csd.size.size + 2)
     classes = [
         {
-            "radius": micro.number(0.5 * size / micro.LENGTH),
+            "radius": micro.number(0.5 * size / micro.MICRO.length),
             "volume_fraction": micro.number(fraction),
             "seed": seed,
         }
         for size, fraction, seed in zip(csd.size, csd.volume_fraction, seeds[2:], strict=True)
     ]
     return {
-        **_material_values(spec),
-        "length": micro.number(request.cloud.length / micro.LENGTH),
-        "skin": micro.number((spec.skin or csd.largest) / micro.LENGTH),
+        **material_values(spec, micro.MICRO),
+        "length": micro.number(request.cloud.length / micro.MICRO.length),
+        "skin": micro.number((spec.skin or csd.largest) / micro.MICRO.length),
         "classes": classes,
         "distribution_seed": seeds[0],
         "insertion_seed": seeds[1],

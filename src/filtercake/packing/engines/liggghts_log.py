@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from filtercake.packing.engines import micro
+from filtercake.packing.engines.micro import MICRO, UnitSystem
 from filtercake.packing.settling import Trajectory
 
 _VERSION = re.compile(r"^LIGGGHTS \(Version (?P<version>.*?)(?:, compiled|\))")
@@ -100,14 +100,16 @@ def parse_log(text: str) -> LiggghtsLog:
     )
 
 
-def trajectory(log: LiggghtsLog, time_step: float, length: float, density: float) -> Trajectory:
+def trajectory(
+    log: LiggghtsLog, time_step: float, length: float, density: float, units: UnitSystem = MICRO
+) -> Trajectory:
     """Turn a log's states into SI (time step in s, length in m, density in kg/m3)."""
     step, height, energy, mass = log.states.T
-    solids = mass * micro.MASS / density
+    solids = mass * units.mass / density
     return Trajectory(
         time=step * time_step,
-        mean_height=height * micro.LENGTH,
-        kinetic_energy=energy * micro.ENERGY,
+        mean_height=height * units.length,
+        kinetic_energy=energy * units.energy,
         porosity_sample=1.0 - solids / length**3,
     )
 

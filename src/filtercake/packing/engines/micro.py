@@ -1,29 +1,52 @@
-"""LIGGGHTS's ``units micro``: the only place where micrometres, microseconds and picograms appear as such.
+"""LIGGGHTS's unit systems: the only place where micrometres, microseconds and picograms appear as such.
 
-SI makes particle volumes underflow the code's tolerances (paper, section 4.1).
+SI makes particle volumes underflow the code's tolerances (paper, section 4.1): ``units micro`` is what is used, SI is
+there to be stress-tested.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
-LENGTH: Final = 1e-6
-"""um in m."""
-TIME: Final = 1e-6
-"""us in s."""
-MASS: Final = 1e-15
-"""pg in kg."""
-# written out, not computed from the three above: 50 kJ/m3 must be 50, not 49.999999999999993
-VELOCITY: Final = 1.0
-"""um/us in m/s."""
-DENSITY: Final = 1e3
-"""pg/um3 in kg/m3."""
-ACCELERATION: Final = 1e6
-"""um/us2 in m/s2."""
-PRESSURE: Final = 1e3
-"""pg/(um us2) in Pa; Young's modulus and cohesion energy density alike."""
-ENERGY: Final = 1e-15
-"""pg um2/us2 in J."""
+
+@dataclass(frozen=True)
+class UnitSystem:
+    """Units of a LIGGGHTS deck, each in SI.
+
+    Attributes
+    ----------
+    name : str
+        LIGGGHTS's word for it.
+    length, time, mass, velocity, density, acceleration, pressure, energy : float
+        Its units; pressure is also that of Young's modulus and cohesion energy density.
+    """
+
+    name: str
+    length: float
+    time: float
+    mass: float
+    velocity: float
+    density: float
+    acceleration: float
+    pressure: float
+    energy: float
+
+
+# written out, not computed from length, time and mass: 50 kJ/m3 must be 50, not 49.999999999999993
+MICRO: Final = UnitSystem(
+    name="micro",
+    length=1e-6,
+    time=1e-6,
+    mass=1e-15,
+    velocity=1.0,
+    density=1e3,
+    acceleration=1e6,
+    pressure=1e3,
+    energy=1e-15,
+)
+"""um, us and pg."""
+SI: Final = UnitSystem("si", *[1.0] * 8)
 
 
 def number(value: float) -> str:

@@ -84,7 +84,9 @@ def _wait(process: subprocess.Popen[bytes], time_limit: float, on_poll: Callable
         if on_poll is not None:
             on_poll()
         if deadline is not None and time.monotonic() > deadline:
-            raise EngineError(f"time limit of {time_limit:g} s reached; the packing was stopped", transient=True)
+            raise EngineError(
+                f"time limit of {time_limit:g} s reached; the packing was stopped", transient=True, outcome="unsettled"
+            )
 
 
 def _kill_group(process: subprocess.Popen[bytes]) -> None:

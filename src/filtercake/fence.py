@@ -1,0 +1,118 @@
+"""The fence around safe ground: scenes that are proven unstable are refused, those that are inaccurate warned about.
+
+Every limit comes from the stability benchmark (``make stability``, docs/stability.md); the configuration is checked
+against it before any job starts. SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from filtercake import contact
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROSECOND
+
+PAGE: Final = "docs/stability.md"
+
+FRICTIONLESS_TIME_STEP: Final = 0.36
+"""Default time step over the Rayleigh step at mu = 0."""
+FRICTIONAL_TIME_STEP: Final = 0.2
+"""The same at mu > 0: rotation on several tangential springs is the fastest motion, and limits the step."""
+LARGEST_TIME_STEP: Final = 1.0
+"""Time step over the Rayleigh step from which beds explode: refused."""
+LARGEST_RELATIVE_OVERLAP: Final = 0.035
+"""Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
+DOUBTFUL_RELATIVE_OVERLAP: Final = 0.01
+"""Contacts overlap by more than this share of the diameter: warned."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What decides whether a scene is safe to settle.
+
+    Attributes
+    ----------
+    smallest : float
+        Smallest diameter, m.
+    density, youngs_modulus, poisson_ratio, restitution, friction, cohesion : float
+        The material, SI.
+    time_step : float
+        Time step, s.
+    """
+
+    smallest: float
+    density: float
+    youngs_modulus: float
+    poisson_ratio: float
+    restitution: float
+    friction: float
+    cohesion: float
+    time_step: float
+
+    @property
+    def rayleigh(self) -> float:
+        """Rayleigh time step of the smallest sphere, s."""
+        return contact.rayleigh_time_step(0.5 * self.smallest, self.density, self.youngs_modulus, self.poisson_ratio)
+
+    @property
+    def overlap(self) -> float:
+        """Equilibrium overlap of equal spheres over their diameter."""
+        return contact.relative_overlap(self.cohesion, self.youngs_modulus, self.poisson_ratio)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing about a scene.
+
+    Attributes
+    ----------
+    key : {"cohesion", "time_step"}
+        Which number it is about.
+    text : str
+        What is wrong, with the number that is allowed and the page that shows why.
+    """
+
+    key: str
+    text: str
+
+
+def default_time_step(friction: float) -> float:
+    """Time step over the Rayleigh step that the benchmark found fastest among the accurate ones."""
+    return FRICTIONAL_TIME_STEP if friction > 0.0 else FRICTIONLESS_TIME_STEP
+
+
+def refusals(scene: Numbers) -> Iterator[Finding]:
+    """Say what is proven unstable about a scene."""
+    if scene.overlap > LARGEST_RELATIVE_OVERLAP:
+        limit = contact.cohesion_at_overlap(LARGEST_RELATIVE_OVERLAP, scene.youngs_modulus, scene.poisson_ratio)
+        yield Finding(
+            "cohesion",
+            f"must be at most {math.floor(limit / KILOJOULE_PER_M3)} kJ/m3 at "
+            f"E = {scene.youngs_modulus / MEGAPASCAL:g} MPa, nu = {scene.poisson_ratio:g}: above it, contacts overlap "
+            f"by more than {LARGEST_RELATIVE_OVERLAP:.1%} of the diameter ({PAGE}); use a larger youngs_modulus_MPa",
+        )
+    if scene.time_step >= LARGEST_TIME_STEP * scene.rayleigh:
+        yield Finding(
+            "time_step",
+            f"must be below the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us ({PAGE}); leave it out for "
+            f"{FRICTIONLESS_TIME_STEP:g} of that (without friction) or {FRICTIONAL_TIME_STEP:g} (with)",
+        )
+
+
+def doubts(scene: Numbers) -> Iterator[Finding]:
+    """Say what is allowed about a scene, but makes its porosity depend on a choice of numbers."""
+    if DOUBTFUL_RELATIVE_OVERLAP < scene.overlap <= LARGEST_RELATIVE_OVERLAP:
+        yield Finding(
+            "cohesion",
+            f"contacts overlap by {scene.overlap:.1%} of the diameter, which alone lowers the porosity by about "
+            f"{3 * 0.65 * scene.overlap:.3f} ({PAGE})",
+        )
+
+
+def verdict(scene: Numbers) -> str:
+    """Return what the configuration says to a scene: ``refused``, ``warned`` or ``allowed``."""
+    if any(True for _ in refusals(scene)):
+        return "refused"
+    return "warned" if any(True for _ in doubts(scene)) else "allowed"
