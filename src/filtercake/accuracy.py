@@ -57,6 +57,25 @@ COLUMNS = (
     "resistance_error",
 )
 
+REFERENCE_COLUMNS = (
+    "study",
+    "csd",
+    "cohesion_kJ_m3",
+    "friction",
+    "engine",
+    "particles",
+    "replicate",
+    "seed",
+    "status",
+    "reason",
+    "porosity",
+    "porosity_as_published",
+    "overlap_max",
+    "steps",
+    "wall_s",
+)
+"""Columns of ``replicates.csv`` that are kept of the reference ensembles."""
+
 Report = Callable[[str], None]
 
 

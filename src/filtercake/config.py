@@ -350,3 +350,4 @@ class Workflow(Model):
         default=[], description="Names of files in config/calibrations, or paths of calibration files."
     )
     results: Annotated[str, Field(min_length=1)] = Field(default="results", description="Folder of the results.")
+    quick: bool = Field(default=False, description="For the benchmarks: a few packings of each case.")

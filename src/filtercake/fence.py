@@ -16,7 +16,7 @@ from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROSECOND
 
 PAGE: Final = "docs/stability.md"
 
-FRICTIONLESS_TIME_STEP: Final = 0.36
+FRICTIONLESS_TIME_STEP: Final = 0.5
 """Default time step over the Rayleigh step at mu = 0."""
 FRICTIONAL_TIME_STEP: Final = 0.2
 """The same at mu > 0: rotation on several tangential springs is the fastest motion, and limits the step."""

@@ -37,12 +37,11 @@ INACCURATE = 0.002
 """Bias of the mean porosity, beyond its own uncertainty, from which a case is called inaccurate."""
 WRONG = 0.005
 """Bias of accepted packings that a user must never meet without a word."""
-REFERENCE_STEP = 0.06
+REFERENCE_STEP = 0.1
 """Time step of the reference over the Rayleigh step."""
 REFERENCE_TOLERANCE = 2e-5
-REFERENCE_FALL_TIMES = 8.0
-REFERENCE_REPLICATES = 16
-REPLICATES = {Embedded.name: 8, Liggghts.name: 6}
+REFERENCE_REPLICATES = 12
+REPLICATES = {Embedded.name: 12, Liggghts.name: 6}
 TIME_LIMIT = 240.0
 """Wall-clock limit of one packing, s: a case that hangs is found out."""
 SI_UNITS = "liggghts_si"
@@ -59,7 +58,6 @@ COLUMNS = (
     "y_name",
     "y",
     "outcome",
-    "fence",
     "n",
     "n_accepted",
     "porosity",
@@ -134,19 +132,22 @@ class Case:
     skin: float = 0.0
 
 
-def cases(engines: Iterable[str], quick: bool = False) -> list[Case]:
-    """List every case; ``quick`` keeps a few of each family.
+def cases(engines: Iterable[str], family: str = "", quick: bool = False) -> list[Case]:
+    """List the cases of one family or of all.
 
     Parameters
     ----------
     engines : iterable of str
         Engines that can run here.
+    family : str
+        Name of a map; empty for all.
     quick : bool
-        For a look at whether all works.
+        A few of them, to see whether all works.
     """
     asked = set(engines)
-    listed = [case for make in _FAMILIES.values() for case in make() if case.engine.removesuffix("_si") in asked]
-    return [case for index, case in enumerate(listed) if not quick or index % 12 == 0]
+    made = [case for name, make in _FAMILIES.items() if family in ("", name) for case in make()]
+    listed = [case for case in made if case.engine.removesuffix("_si") in asked]
+    return [case for index, case in enumerate(listed) if not quick or index % 12 == 6]
 
 
 def families() -> tuple[str, ...]:
@@ -168,9 +169,9 @@ def _grid(
 
 def _time_step_cohesion() -> Iterable[Case]:
     names = ("time_step_cohesion", Embedded.name, "time_step")
-    yield from _grid(*names, (0.02,), "cohesion_kJ_m3", (0.0, 50.0))
-    steps = (0.12, 0.2, 0.36, 0.5, 0.7, 0.9, 1.1, 2.0)
-    yield from _grid(*names, steps, "cohesion_kJ_m3", (0.0, 15.0, 50.0, 100.0, 200.0, 500.0))
+    yield from _grid(*names, (0.02,), "cohesion_kJ_m3", (50.0,))
+    steps = (0.12, 0.36, 0.5, 0.7, 0.9, 1.1, 2.0)
+    yield from _grid(*names, steps, "cohesion_kJ_m3", (0.0, 50.0, 100.0, 200.0, 500.0))
     names = ("time_step_cohesion", Liggghts.name, "time_step")
     yield from _grid(*names, (0.12, 0.36, 0.7, 1.1, 2.0), "cohesion_kJ_m3", (0.0, 50.0, 200.0, 500.0))
 
@@ -178,15 +179,15 @@ def _time_step_cohesion() -> Iterable[Case]:
 def _time_step_friction() -> Iterable[Case]:
     names = ("time_step_friction", Embedded.name, "time_step")
     steps = (0.12, 0.2, 0.28, 0.36, 0.5, 0.7, 1.1)
-    yield from _grid(*names, steps, "friction", (0.05, 0.3, 1.0, 2.0))
+    yield from _grid(*names, steps, "friction", (0.05, 0.3, 2.0))
     yield from _grid("time_step_friction", Liggghts.name, "time_step", (0.2, 0.36, 0.7), "friction", (0.3, 2.0))
 
 
 def _modulus_cohesion() -> Iterable[Case]:
     names = ("modulus_cohesion", Embedded.name, "youngs_modulus_MPa")
-    yield from _grid(*names, (0.5, 1.0, 2.0, 5.0), "cohesion_kJ_m3", (0.0, 15.0, 50.0, 100.0, 200.0))
-    yield from _grid(*names, (50.0,), "cohesion_kJ_m3", (0.0, 50.0, 200.0, 500.0))
-    yield from _grid(*names, (500.0,), "cohesion_kJ_m3", (50.0, 500.0))
+    yield from _grid(*names, (0.5, 1.0, 2.0), "cohesion_kJ_m3", (0.0, 15.0, 50.0, 100.0))
+    yield from _grid(*names, (50.0,), "cohesion_kJ_m3", (0.0, 200.0))
+    yield from _grid(*names, (500.0,), "cohesion_kJ_m3", (50.0,))
     yield from _grid(
         "modulus_cohesion", Liggghts.name, "youngs_modulus_MPa", (0.5, 5.0, 50.0), "cohesion_kJ_m3", (50.0,)
     )
@@ -194,7 +195,7 @@ def _modulus_cohesion() -> Iterable[Case]:
 
 def _restitution_time_step() -> Iterable[Case]:
     names = ("restitution_time_step", Embedded.name, "restitution")
-    yield from _grid(*names, (0.01, 0.1, 0.3, 0.6, 0.9, 0.99), "time_step", (0.2, 0.36, 0.7))
+    yield from _grid(*names, (0.01, 0.1, 0.3, 0.9, 0.99), "time_step", (0.2, 0.36, 0.7))
     yield from _grid("restitution_time_step", Liggghts.name, "restitution", (0.01, 0.99), "time_step", (0.36,))
 
 
@@ -206,7 +207,7 @@ def _size_ratio_skin() -> Iterable[Case]:
 
 
 def _density_drop() -> Iterable[Case]:
-    axes = ("density_kg_m3", (118.0, 1180.0, 11_800.0, 118_000.0), "drop_height", (1.0, 3.0, 10.0))
+    axes = ("density_kg_m3", (118.0, 1180.0, 118_000.0), "drop_height", (1.0, 3.0, 10.0))
     yield from _grid("density_drop", Embedded.name, *axes)
     yield from _grid("density_drop", Liggghts.name, "density_kg_m3", (1180.0, 118_000.0), "drop_height", (1.0, 10.0))
 
@@ -278,6 +279,8 @@ def spec_of(case: Case) -> tuple[PackingSpec, CrystalSizeDistribution]:
         time_step=(case.time_step or fence.default_time_step(scene.friction)) * rayleigh,
         engine=case.engine,
         skin=case.skin * csd.smallest,
+        # thrown fast, they are down soon, but rebound as high as if they had fallen
+        max_fall_times=4.0 * scene.drop_height,
         time_limit=TIME_LIMIT,
         column_ratio=column,
         processes=1,
@@ -323,9 +326,9 @@ def _reference(scene: Scene, replicates: int) -> list[float]:
     spec = replace(
         spec,
         porosity_tolerance=REFERENCE_TOLERANCE,
-        max_fall_times=REFERENCE_FALL_TIMES,
-        # wide beds take minutes at a sixth of the default step
-        time_step=spec.time_step * (3.0 if wide else 1.0),
+        max_fall_times=2.0 * spec.max_fall_times,
+        # wide beds would take minutes each
+        time_step=spec.time_step * (2.0 if wide else 1.0),
         seed=2,
     )
     tries = (_try(spec, csd, k) for k in range(max(2, replicates // 4) if wide else replicates))
@@ -362,7 +365,6 @@ def _judge(case: Case, reference: list[float], replicates: int) -> dict[str, Any
     return {
         **{name: getattr(case, name) for name in ("family", "engine", "x_name", "x", "y_name", "y")},
         "outcome": outcome,
-        "fence": fence.verdict(_numbers(spec, csd)),
         "n": len(tries),
         "n_accepted": values.size,
         "porosity": float(values.mean()) if values.size else math.nan,
@@ -371,7 +373,7 @@ def _judge(case: Case, reference: list[float], replicates: int) -> dict[str, Any
         "bias_se": error,
         **{name: _largest(getattr(result, name) for result in tries) for name in ("energy_gain", "momentum_drift")},
         "overlap_max": _largest(result.overlap for result in tries),
-        "seconds": float(np.nanmean([result.seconds for result in tries])) if tries else math.nan,
+        "seconds": _mean(result.seconds for result in tries),
         "reason": reasons.most_common(1)[0][0] if reasons else "",
     }
 
@@ -434,6 +436,19 @@ def momentum_drift(state: SettledState) -> float:
     return float(np.hypot(*sideways)) if np.isfinite(sideways).all() else math.inf
 
 
+def with_fence(table: pd.DataFrame) -> pd.DataFrame:
+    """Add what the configuration says to each case today: column ``fence``.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Of :func:`run`.
+    """
+    known = {(c.family, c.engine, c.x, c.y): c for c in cases({str(e).removesuffix("_si") for e in table["engine"]})}
+    keys = table[["family", "engine", "x", "y"]].itertuples(index=False, name=None)
+    return table.assign(fence=[fence.verdict(_numbers(*spec_of(known[key]))) for key in keys])
+
+
 def undetected(table: pd.DataFrame) -> pd.DataFrame:
     """Rows whose accepted packings are wrong, though the configuration would let them pass without a word."""
     wrong = (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
@@ -442,6 +457,11 @@ def undetected(table: pd.DataFrame) -> pd.DataFrame:
 
 def _standard_error(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
     return float(values.std(ddof=1) / math.sqrt(values.size)) if values.size > 1 else math.nan
+
+
+def _mean(values: Iterable[float]) -> float:
+    found = [value for value in values if not math.isnan(value)]
+    return sum(found) / len(found) if found else math.nan
 
 
 def _largest(values: Iterable[float]) -> float:

@@ -158,10 +158,15 @@ def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution,
     return list(points.values())
 
 
-def base_point(study: LoadedStudy, csd: str, choose_engine: Callable[[CrystalSizeDistribution, int], str]) -> Point:
-    """Return the point of a distribution at the study's base material."""
+def base_point(
+    study: LoadedStudy,
+    csd: str,
+    choose_engine: Callable[[CrystalSizeDistribution, int], str],
+    **changed: float,
+) -> Point:
+    """Return the point of a distribution at the study's base material, but for the properties named by ``changed``."""
     base = {name: getattr(study.model.material, name) for name in SWEPT}
-    return _point(study, csd, base, study.model.packing.replicates, choose_engine)
+    return _point(study, csd, {**base, **changed}, study.model.packing.replicates, choose_engine)
 
 
 def bed_of(settings: Packing, csd: CrystalSizeDistribution) -> BedSize:

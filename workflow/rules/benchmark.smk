@@ -229,3 +229,239 @@ rule time_growth:
         "timing the embedded engine's growth"
     script:
         "../scripts/growth.py"
+
+
+# reference ensembles: hours of LIGGGHTS, whose packings' table is kept in docs/data
+REFERENCES = {
+    study.name: study
+    for study in load_studies(
+        sorted((ROOT / "config" / "benchmarks").glob("reference_*.yaml"))
+    )
+}
+KNOWN.update(REFERENCES)
+KNOWN_POINTS.update(points_by_name(REFERENCES))
+
+
+rule reference:
+    input:
+        expand("{results}/benchmark/reference_replicates.csv", results=RESULTS),
+    localrule: True
+
+
+rule gather_references:
+    input:
+        replicates=expand(
+            "{results}/{study}/replicates.csv", results=RESULTS, study=REFERENCES
+        ),
+    output:
+        "{results}/benchmark/reference_replicates.csv",
+    log:
+        "{results}/benchmark/logs/reference.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/reference.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    message:
+        "gathering the reference ensembles"
+    script:
+        "../scripts/reference.py"
+
+
+# run time against error: every variant of a case in turn, in one job of one thread; the cases go side by side, so that
+# all are timed under the same load. --config quick=true takes a few packings of each
+QUICK = bool(config.get("quick", False))
+PMMA = str(ROOT / "config" / "studies" / "pmma.yaml")
+ALUM = str(ROOT / "config" / "benchmarks" / "agreement_alum.yaml")
+ERROR_CASES = {
+    "pmma": {
+        "study": PMMA,
+        "csd": "pmma_50_50",
+        "friction": 0.0,
+        "particles": 2000,
+        "reference": "reference_pmma",
+    },
+    "alum_wide": {
+        "study": ALUM,
+        "csd": "alum_15min",
+        "friction": 0.0,
+        "particles": 20_000,
+        "reference": "reference_alum",
+    },
+    "pmma_friction": {
+        "study": PMMA,
+        "csd": "pmma_50_50",
+        "friction": 0.3,
+        "particles": 2000,
+        "reference": "reference_pmma",
+    },
+    "alum": {
+        "study": ALUM,
+        "csd": "alum_15min",
+        "friction": 0.0,
+        "particles": 4000,
+        "reference": "reference_alum_small",
+    },
+}
+if QUICK:
+    del ERROR_CASES["alum_wide"]
+BENCHMARK = f"{RESULTS}/benchmark{'_quick' if QUICK else ''}"
+
+
+rule benchmark:
+    input:
+        f"{BENCHMARK}/benchmark.md",
+    localrule: True
+
+
+rule time_variants:
+    input:
+        reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
+        library=library("accuracy"),
+        templates=sorted(
+            str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
+        ),
+    output:
+        timings=f"{BENCHMARK}/variants/{{case}}.csv",
+        errors=f"{BENCHMARK}/errors/{{case}}.csv",
+    log:
+        f"{BENCHMARK}/logs/variants/{{case}}.log",
+    benchmark:
+        f"{BENCHMARK}/benchmarks/variants/{{case}}.tsv"
+    # the longest first
+    priority: 50
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=2000,
+        runtime=120,
+    params:
+        case=lambda wildcards: ERROR_CASES[wildcards.case],
+        quick=QUICK,
+    message:
+        "run time and error: {wildcards.case}"
+    script:
+        "../scripts/run_time_error.py"
+
+
+rule choices:
+    input:
+        library=library("accuracy"),
+    output:
+        f"{BENCHMARK}/choices.csv",
+    log:
+        f"{BENCHMARK}/logs/choices.log",
+    benchmark:
+        f"{BENCHMARK}/benchmarks/choices.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    params:
+        study=PMMA,
+        csd="pmma_50_50",
+        wide=ALUM,
+        wide_csd="alum_15min",
+        replicates=4 if QUICK else 24,
+    message:
+        "what the model leaves open"
+    script:
+        "../scripts/choices.py"
+
+
+rule benchmark_page:
+    input:
+        errors=expand("{folder}/errors/{case}.csv", folder=BENCHMARK, case=ERROR_CASES),
+        reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
+        choices=f"{BENCHMARK}/choices.csv",
+        template=str(ROOT / "workflow" / "report" / "benchmark.md.j2"),
+        library=library("pages"),
+        figure=library("figures.run_time_error"),
+    output:
+        table=f"{BENCHMARK}/run_time_error.csv",
+        png=f"{BENCHMARK}/run_time_error.png",
+        pdf=f"{BENCHMARK}/run_time_error.pdf",
+        page=f"{BENCHMARK}/benchmark.md",
+    log:
+        f"{BENCHMARK}/logs/page.log",
+    benchmark:
+        f"{BENCHMARK}/benchmarks/page.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    params:
+        cases=ERROR_CASES,
+        data=str(ROOT / "docs" / "data"),
+    message:
+        "page on run time and error"
+    script:
+        "../scripts/benchmark_page.py"
+
+
+# stress tests: one job per map
+rule stability:
+    input:
+        f"{BENCHMARK}/stability.md",
+    localrule: True
+
+
+rule stress:
+    input:
+        library=library("stability"),
+        templates=sorted(
+            str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
+        ),
+    output:
+        f"{BENCHMARK}/stress/{{family}}.csv",
+    log:
+        f"{BENCHMARK}/logs/stress/{{family}}.log",
+    benchmark:
+        f"{BENCHMARK}/benchmarks/stress/{{family}}.tsv"
+    wildcard_constraints:
+        family="|".join(stress_families()),
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=2000,
+        runtime=120,
+    params:
+        quick=QUICK,
+    message:
+        "stress tests: {wildcards.family}"
+    script:
+        "../scripts/stability.py"
+
+
+rule stability_page:
+    input:
+        tables=expand(
+            "{folder}/stress/{family}.csv",
+            folder=BENCHMARK,
+            family=stress_families(),
+        ),
+        template=str(ROOT / "workflow" / "report" / "stability.md.j2"),
+        library=library("pages"),
+        figure=library("figures.stability_maps"),
+    output:
+        table=f"{BENCHMARK}/stability.csv",
+        png=f"{BENCHMARK}/stability_maps.png",
+        pdf=f"{BENCHMARK}/stability_maps.pdf",
+        page=f"{BENCHMARK}/stability.md",
+    log:
+        f"{BENCHMARK}/logs/stability_page.log",
+    benchmark:
+        f"{BENCHMARK}/benchmarks/stability_page.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    message:
+        "page on stability"
+    script:
+        "../scripts/stability_page.py"

@@ -20,6 +20,7 @@ from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
 from filtercake.packing.result import read_record
 from filtercake.provenance import packing_sources, sources
+from filtercake.stability import families as stress_families
 from filtercake.study import expand as expand_points, with_engine
 from filtercake.units import MICROMETRE
 

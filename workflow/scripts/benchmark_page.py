@@ -1,0 +1,32 @@
+"""Rule benchmark_page: one table, the plot and the page of run time against error."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake import pages
+from filtercake.accuracy import on_front
+from filtercake.figures import run_time_error
+from filtercake.figures.catalogue import save
+from filtercake.figures.style import applied
+from filtercake.job import job
+from filtercake.packing.result import publish
+
+with job(snakemake.log[0]):
+    table = pd.concat([pd.read_csv(file) for file in snakemake.input.errors], ignore_index=True)
+    table["on_front"] = table.groupby(["case", "estimator"], group_keys=False)[["seconds", "error"]].apply(on_front)
+    references = pages.reference_table(pd.read_csv(snakemake.input.reference), snakemake.params.cases)
+    with publish(Path(snakemake.output.table)) as temporary:
+        table.to_csv(temporary, index=False)
+    with applied():
+        figure = run_time_error.draw(table, references)
+        save(figure, Path(snakemake.output.png), Path(snakemake.output.pdf))
+    page = pages.benchmark(
+        Path(snakemake.input.template),
+        table,
+        references,
+        pd.read_csv(snakemake.input.choices),
+        Path(snakemake.params.data),
+    )
+    with publish(Path(snakemake.output.page)) as temporary:
+        temporary.write_text(page, encoding="utf-8")

@@ -1,0 +1,35 @@
+"""Rule time_variants: every variant of one scene in turn, its time and its error."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake import engine_choice
+from filtercake.accuracy import errors, reference_of, time_peers, time_variants, variants
+from filtercake.config_loading import load_study
+from filtercake.job import Progress, job
+from filtercake.packing.result import publish
+from filtercake.study import base_point
+
+with job(snakemake.log[0]) as log:
+    case, name = snakemake.params.case, snakemake.wildcards.case
+    study = load_study(Path(case["study"]))
+    spec = base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).spec
+    spec = replace(spec, particles=case["particles"])
+    csd = study.csds[case["csd"]]
+    listed = variants(name, spec, csd.full, quick=snakemake.params.quick)
+    timings = pd.concat(
+        [
+            time_variants(listed, lambda line: (log.info(line), Progress().note(line))),
+            time_peers(csd.truncated),
+        ],
+        ignore_index=True,
+    )
+    reference = reference_of(pd.read_csv(snakemake.input.reference), case["reference"], case["friction"])
+    for output, table in (
+        (snakemake.output.timings, timings),
+        (snakemake.output.errors, errors(name, timings, reference)),
+    ):
+        with publish(Path(output)) as temporary:
+            table.to_csv(temporary, index=False)
