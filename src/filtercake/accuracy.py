@@ -218,7 +218,7 @@ def _pmma(make: _Maker) -> list[Variant]:
 
 def _pmma_friction(make: _Maker) -> list[Variant]:
     listed = [make.default(24)]
-    listed += make.time_steps({0.06: 4, 0.12: 8, 0.2: 12, 0.28: 16, 0.36: 16, 0.5: 16})
+    listed += make.time_steps({0.06: 4, 0.12: 8, 0.28: 16, 0.36: 16, 0.5: 16})
     listed += [make.one("spheres", 1000, 24, particles=1000)]
     return listed + make.liggghts(4)
 

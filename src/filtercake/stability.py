@@ -40,8 +40,8 @@ WRONG = 0.005
 REFERENCE_STEP = 0.1
 """Time step of the reference over the Rayleigh step."""
 REFERENCE_TOLERANCE = 2e-5
-REFERENCE_REPLICATES = 12
-REPLICATES = {Embedded.name: 12, Liggghts.name: 6}
+REFERENCE_REPLICATES = 8
+REPLICATES = {Embedded.name: 8, Liggghts.name: 4}
 TIME_LIMIT = 240.0
 """Wall-clock limit of one packing, s: a case that hangs is found out."""
 SI_UNITS = "liggghts_si"

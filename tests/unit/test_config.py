@@ -296,8 +296,18 @@ def test_a_wrong_value_is_named(
         ("time_step_rayleigh: 1.5", "time_step_rayleigh", "1.5", "must be less than 1"),
         ("time_step_us: 0", "time_step_us", "0", "must be greater than 0"),
         # pi 10e-6 sqrt(1180/(5e6/2.4))/(0.1631*0.2 + 0.8766) = 0.8223 us
-        ("time_step_us: 0.9", "time_step_us", "0.9", "must be below the Rayleigh time step 0.8223 us (docs/stability.md)"),
-        ("time_step_us: 8e2", "time_step_us", "800", "must be below the Rayleigh time step 0.8223 us (docs/stability.md)"),
+        (
+            "time_step_us: 0.9",
+            "time_step_us",
+            "0.9",
+            "below the Rayleigh time step 0.8223 us (docs/stability.md)",
+        ),
+        (
+            "time_step_us: 8e2",
+            "time_step_us",
+            "800",
+            "below the Rayleigh time step 0.8223 us (docs/stability.md)",
+        ),
         ("replicates: 0", "replicates", "0", "must be greater than or equal to 1"),
         ("engine: lammps", "engine", "'lammps'", "allowed: 'auto', 'liggghts'"),
         ("seed: -1", "seed", "-1", "must be greater than or equal to 0"),

@@ -1,0 +1,58 @@
+"""What the fence refuses and warns about, by its own limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from filtercake import contact, fence
+
+RAYLEIGH = contact.rayleigh_time_step(10e-6, 1180.0, 5e6, 0.2)
+SCENE = fence.Numbers(
+    smallest=20e-6,
+    density=1180.0,
+    youngs_modulus=5e6,
+    poisson_ratio=0.2,
+    restitution=0.3,
+    friction=0.0,
+    cohesion=50e3,
+    time_step=fence.FRICTIONLESS_TIME_STEP * RAYLEIGH,
+)
+
+
+def test_the_papers_scene_passes_without_a_word() -> None:
+    assert fence.verdict(SCENE) == "allowed"
+    assert not list(fence.refusals(SCENE))
+    assert not list(fence.doubts(SCENE))
+
+
+def test_defaults_are_inside() -> None:
+    for friction in (0.0, 0.05, 0.3, 1.0):
+        scene = replace(SCENE, friction=friction, time_step=fence.default_time_step(friction) * RAYLEIGH)
+        assert fence.verdict(scene) == "allowed"
+
+
+@pytest.mark.parametrize(
+    ("changed", "key", "says"),
+    [
+        ({"cohesion": 250e3}, "cohesion", "must be at most 206 kJ/m3 at E = 5 MPa, nu = 0.2"),
+        ({"youngs_modulus": 1e6}, "cohesion", "must be at most 41 kJ/m3 at E = 1 MPa"),
+        ({"time_step": 1.01 * RAYLEIGH}, "time_step", "Rayleigh time step 0.8223 us"),
+    ],
+)
+def test_outside_is_refused(changed: dict[str, float], key: str, says: str) -> None:
+    scene = replace(SCENE, **changed)
+    found = [finding for finding in fence.refusals(scene) if finding.key == key]
+    assert len(found) == 1
+    assert says in found[0].text
+    assert fence.PAGE in found[0].text
+    assert fence.verdict(scene) == "refused"
+
+
+def test_soft_contacts_are_warned_about() -> None:
+    scene = replace(SCENE, cohesion=150e3)
+    (finding,) = fence.doubts(scene)
+    assert finding.key == "cohesion"
+    assert "1.8% of the diameter" in finding.text  # (150/50)^2 * 0.205 %
+    assert fence.verdict(scene) == "warned"
