@@ -50,7 +50,7 @@ TWIN = {
     study.name: study
     for study in load_studies(
         ROOT / "config" / "benchmarks" / f"{name}.yaml"
-        for name in ("twin", "twin_truth")
+        for name in ("twin", "twin_truth", "twin_friction", "twin_friction_truth")
     )
 }
 KNOWN.update(TWIN)
@@ -65,8 +65,16 @@ rule twin:
 
 rule repeat_calibrations:
     input:
-        pool=expand("{results}/twin/replicates.csv", results=RESULTS),
-        truth=expand("{results}/twin_truth/replicates.csv", results=RESULTS),
+        pool=expand(
+            "{results}/{study}/replicates.csv",
+            results=RESULTS,
+            study=["twin", "twin_friction"],
+        ),
+        truth=expand(
+            "{results}/{study}/replicates.csv",
+            results=RESULTS,
+            study=["twin_truth", "twin_friction_truth"],
+        ),
         library=library("twin"),
     output:
         table="{results}/benchmark/twin.csv",
@@ -365,7 +373,7 @@ rule choices:
         csd="pmma_50_50",
         wide=ALUM,
         wide_csd="alum_15min",
-        replicates=4 if QUICK else 24,
+        replicates=4 if QUICK else 16,
     message:
         "what the model leaves open"
     script:

@@ -9,7 +9,10 @@ from filtercake.packing.result import publish
 from filtercake.twin import repeat_calibrations, summarise
 
 with job(snakemake.log[0]) as log:
-    pool, truth = (pd.read_csv(file[0]) for file in (snakemake.input.pool, snakemake.input.truth))
+    pool, truth = (
+        pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
+        for files in (snakemake.input.pool, snakemake.input.truth)
+    )
     asked = {name: snakemake.params[name] for name in ("repeats", "tests", "noise")}
     repeats = pd.concat(
         [
