@@ -9,7 +9,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run calibrate test test-all lint format schemas figures regression speed growth agreement twin bed-size references resume retry lock setup clean help
+.PHONY: run benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -46,6 +46,22 @@ calibrate: setup ## fit the cohesion to measured resistances (CALIBRATION=name o
 
 figures: setup ## redraw the figures
 	$(SNAKEMAKE) $(CONFIG) --forcerun figure
+
+benchmark: setup ## run time against error: docs/benchmark.md (about 30 min on 2 cores; QUICK=1: a few minutes, docs untouched)
+	$(SNAKEMAKE) benchmark $(if $(QUICK),--config quick=true)
+	$(if $(QUICK),,install -m 644 results/benchmark/benchmark.md docs/)
+	$(if $(QUICK),,install -m 644 results/benchmark/images/run_time_error.png docs/images/)
+	$(if $(QUICK),,install -m 644 results/benchmark/run_time_error.csv results/benchmark/choices.csv results/benchmark/coverage.csv docs/data/)
+
+stability: setup ## stress tests of both engines: docs/stability.md (about 30 min on 2 cores; QUICK=1 as above)
+	$(SNAKEMAKE) stability $(if $(QUICK),--config quick=true)
+	$(if $(QUICK),,install -m 644 results/benchmark/stability.md docs/)
+	$(if $(QUICK),,install -m 644 results/benchmark/images/stability_maps.png docs/images/)
+	$(if $(QUICK),,install -m 644 results/benchmark/stability.csv docs/data/)
+
+reference: setup ## remake the reference ensembles of docs/data (about 2 h on 2 cores; needs LIGGGHTS)
+	$(SNAKEMAKE) reference
+	install -m 644 results/benchmark/reference_replicates.csv docs/data/
 
 regression: setup ## the paper's protocol against its authors' own numbers (about 15 min on 2 cores)
 	$(SNAKEMAKE) --config studies=config/benchmarks/as_published.yaml

@@ -34,7 +34,14 @@ def reference_table(replicates: pd.DataFrame, cases: Mapping[str, Mapping[str, A
     return pd.DataFrame(rows, columns=["case", "porosity", "standard_error", "n"])
 
 
-def benchmark(template: Path, errors: pd.DataFrame, references: pd.DataFrame, choices: pd.DataFrame, data: Path) -> str:
+def benchmark(
+    template: Path,
+    errors: pd.DataFrame,
+    references: pd.DataFrame,
+    choices: pd.DataFrame,
+    coverage: pd.DataFrame,
+    data: Path,
+) -> str:
     """Write the page on run time and error.
 
     Parameters
@@ -47,6 +54,8 @@ def benchmark(template: Path, errors: pd.DataFrame, references: pd.DataFrame, ch
         Of :func:`reference_table`.
     choices : DataFrame
         Of :func:`filtercake.accuracy.choice_table`.
+    coverage : DataFrame
+        Of :func:`filtercake.accuracy.coverage`.
     data : Path
         Folder of the committed results of long computations, whose tables the page shows too.
     """
@@ -57,6 +66,13 @@ def benchmark(template: Path, errors: pd.DataFrame, references: pd.DataFrame, ch
         errors=_records(errors),
         references={row["case"]: row for row in _records(references)},
         choices=_records(choices),
+        coverage={
+            "repeats": len(coverage),
+            "met": int((coverage["covered"] & coverage["reached"]).sum()),
+            "least": int(coverage["n"].min()),
+            "most": int(coverage["n"].max()),
+            "mean": float(coverage["n"].mean()),
+        },
         headline={case: headline(errors[errors["case"] == case]) for case in errors["case"].unique()},
         data=tables,
     )

@@ -55,6 +55,10 @@ def choice_rows() -> pd.DataFrame:
     return pd.DataFrame([{**row, "porosity_change": -0.004, "porosity_change_ci95": 0.001, "resistance_change": 0.04}])
 
 
+def coverage_rows() -> pd.DataFrame:
+    return pd.DataFrame({"n": [6, 9, 12], "covered": [True, True, False], "reached": [True, True, True]})
+
+
 def test_the_headline_compares_with_the_papers_own_estimator() -> None:
     found = pages.headline(error_rows())
     assert found["published"]["estimator"] == "count"
@@ -71,11 +75,12 @@ def test_without_the_published_protocol_there_is_no_ratio() -> None:
 def test_the_benchmark_page_holds_the_tables_numbers() -> None:
     errors = error_rows().assign(on_front=True)
     data = REPOSITORY / "docs" / "data"
-    page = pages.benchmark(TEMPLATES / "benchmark.md.j2", errors, references(), choice_rows(), data)
+    page = pages.benchmark(TEMPLATES / "benchmark.md.j2", errors, references(), choice_rows(), coverage_rows(), data)
     assert "| pmma | filtercake's default | 0.5 | 200 |" in page
     assert "| pmma | fastest with no larger an error: spheres 0.5 | 0.125 | 800 |" in page
     assert "| drop height | the paper's | 2 times | -0.0040 +- 0.0010 | +4.0 % |" in page
     assert "| pmma | 0.3512 | 0.0004 | 24 |" in page
+    assert "in 2 of 3" in page
     assert "{{" not in page
     assert "nan" not in page.lower().replace("nano", "")
 

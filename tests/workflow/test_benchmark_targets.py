@@ -17,6 +17,9 @@ REPOSITORY = Path(__file__).resolve().parents[2]
         ("agreement", ["compare_engines", "replicates", "packing", "csd"]),
         ("speed", ["time_in_turn"]),
         ("growth", ["time_growth"]),
+        ("reference", ["gather_references", "replicates", "packing"]),
+        ("benchmark", ["time_variants", "choices", "coverage", "benchmark_page"]),
+        ("stability", ["stress", "stability_page"]),
     ],
 )
 def test_a_benchmark_is_planned(target: str, jobs: list[str], tmp_path: Path) -> None:

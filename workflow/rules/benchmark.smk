@@ -380,8 +380,34 @@ rule choices:
         "../scripts/choices.py"
 
 
+rule coverage:
+    input:
+        reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
+        library=library("accuracy"),
+    output:
+        f"{BENCHMARK}/coverage.csv",
+    log:
+        f"{BENCHMARK}/logs/coverage.log",
+    benchmark:
+        f"{BENCHMARK}/benchmarks/coverage.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    params:
+        case=ERROR_CASES["pmma"],
+        interval=0.002,
+        repeats=4 if QUICK else 20,
+    message:
+        "an interval asked for, again and again"
+    script:
+        "../scripts/coverage.py"
+
+
 rule benchmark_page:
     input:
+        coverage=f"{BENCHMARK}/coverage.csv",
         errors=expand("{folder}/errors/{case}.csv", folder=BENCHMARK, case=ERROR_CASES),
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
         choices=f"{BENCHMARK}/choices.csv",
@@ -390,8 +416,8 @@ rule benchmark_page:
         figure=library("figures.run_time_error"),
     output:
         table=f"{BENCHMARK}/run_time_error.csv",
-        png=f"{BENCHMARK}/run_time_error.png",
-        pdf=f"{BENCHMARK}/run_time_error.pdf",
+        png=f"{BENCHMARK}/images/run_time_error.png",
+        pdf=f"{BENCHMARK}/images/run_time_error.pdf",
         page=f"{BENCHMARK}/benchmark.md",
     log:
         f"{BENCHMARK}/logs/page.log",
@@ -457,8 +483,8 @@ rule stability_page:
         figure=library("figures.stability_maps"),
     output:
         table=f"{BENCHMARK}/stability.csv",
-        png=f"{BENCHMARK}/stability_maps.png",
-        pdf=f"{BENCHMARK}/stability_maps.pdf",
+        png=f"{BENCHMARK}/images/stability_maps.png",
+        pdf=f"{BENCHMARK}/images/stability_maps.pdf",
         page=f"{BENCHMARK}/stability.md",
     log:
         f"{BENCHMARK}/logs/stability_page.log",

@@ -1,0 +1,25 @@
+"""Rule coverage: ask for an interval again and again, and see how often it holds the reference."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.accuracy import coverage, reference_of
+from filtercake.config_loading import load_study
+from filtercake.job import Progress, job
+from filtercake.packing.result import publish
+from filtercake.study import base_point
+
+with job(snakemake.log[0]) as log:
+    case = snakemake.params.case
+    study = load_study(Path(case["study"]))
+    table = coverage(
+        base_point(study, case["csd"], lambda _csd, _particles: "embedded", friction=case["friction"]).spec,
+        study.csds[case["csd"]].truncated,
+        reference_of(pd.read_csv(snakemake.input.reference), case["reference"], case["friction"]),
+        snakemake.params.interval,
+        snakemake.params.repeats,
+        lambda line: (log.info(line), Progress().note(line)),
+    )
+    with publish(Path(snakemake.output[0])) as temporary:
+        table.to_csv(temporary, index=False)
