@@ -307,6 +307,9 @@ class Published(Model):
     kind: Literal["simulation", "measurement"] = Field(description="Simulated or measured.")
     cohesion_kJ_m3: Cohesion | None = Field(default=None, description="At this cohesion, kJ/m3.")  # noqa: N815
     friction: Friction | None = Field(default=None, description="At this friction.")
+    kinetics: Name | None = Field(
+        default=None, description="Of the product of these kinetics; not shown beside crystals of others."
+    )
     particles: Annotated[int, Field(ge=1), TO_WHOLE] | None = Field(
         default=None, description="For this number of spheres (system_dimension_um), if not the study's."
     )

@@ -1,0 +1,120 @@
+"""What a crystallizer gives a study: a distribution per residence time, and the density of the crystals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from filtercake.config import Crystallizer, Csd, Material, Published, Study, Sweep
+from filtercake.crystallizer import Kinetics, get_kinetics, load_kinetics
+from filtercake.errors import ConfigError, CrystallizerError, Problem
+
+
+def product_name(residence_time_min: float) -> str:
+    """Name of the crystallizer's product at a residence time, as a distribution of the study."""
+    return f"tau_{residence_time_min:g}min".replace(".", "p")
+
+
+def resolve(model: Study, path: Path) -> tuple[Study, Kinetics | None, list[str]]:
+    """Give the residence times of sweeps a distribution each, and the material the kinetics' density if it has none.
+
+    Parameters
+    ----------
+    model : Study
+        The study as it is written.
+    path : Path
+        Its file.
+
+    Returns
+    -------
+    Study
+        With a distribution for every product; published values of other kinetics are left out.
+    Kinetics or None
+        The crystallizer's.
+    list of str
+        Warnings.
+
+    Raises
+    ------
+    ConfigError
+        If the kinetics are not known, or residence times or a density are asked for that nothing gives.
+    """
+    if model.crystallizer is None:
+        problems = list(_without_crystallizer(model, str(path)))
+        if problems:
+            raise ConfigError(problems)
+        return model, None, []
+    kinetics = _kinetics(model.crystallizer, path)
+    csds, sweeps = _with_products(model, model.crystallizer)
+    published, warnings = _of_kinetics(model.published, kinetics.name, str(path))
+    changes = {
+        "csds": csds,
+        "sweeps": sweeps,
+        "material": _with_density(model.material, kinetics),
+        "published": published,
+    }
+    return model.model_copy(update=changes), kinetics, warnings
+
+
+def _without_crystallizer(model: Study, file: str) -> Iterator[Problem]:
+    """Name what only a crystallizer could give."""
+    asked = [
+        f"csds.{name}.residence_time_min" for name, csd in model.csds.items() if csd.residence_time_min is not None
+    ]
+    asked += [f"sweeps[{i}].residence_time_min" for i, s in enumerate(model.sweeps) if s.residence_time_min is not None]
+    asked += [f"published[{i}].kinetics" for i, entry in enumerate(model.published) if entry.kinetics is not None]
+    for key in asked:
+        yield Problem(file, key, "", "needs a crystallizer in the study")
+    if model.filter is not None:
+        yield Problem(file, "filter", "", "needs a crystallizer in the study, for its slurry")
+    if model.material.density_kg_m3 is None:
+        yield Problem(file, "material.density_kg_m3", "(missing)", "must be given")
+
+
+def _kinetics(crystallizer: Crystallizer, path: Path) -> Kinetics:
+    try:
+        own = load_kinetics(path.parent / crystallizer.kinetics_file) if crystallizer.kinetics_file else None
+        return get_kinetics(crystallizer.kinetics, own)
+    except CrystallizerError as error:
+        asked = repr(crystallizer.kinetics)
+        allowed = str(error).removeprefix(f"kinetics = {asked}: ")
+        raise ConfigError([Problem(str(path), "crystallizer.kinetics", asked, allowed)]) from None
+
+
+def _with_density(material: Material, kinetics: Kinetics) -> Material:
+    if material.density_kg_m3 is not None:
+        return material
+    return material.model_copy(update={"density_kg_m3": kinetics.density})
+
+
+def _with_products(model: Study, crystallizer: Crystallizer) -> tuple[dict[str, Csd], list[Sweep]]:
+    """Distributions with those of every residence time, and sweeps that name them."""
+    csds, sweeps = dict(model.csds), []
+    for sweep in model.sweeps:
+        times = sweep.residence_time_min
+        if times is not None:
+            for time in times:
+                csds.setdefault(product_name(time), _product(time, crystallizer))
+            sweep = sweep.model_copy(update={"csd": [product_name(time) for time in times], "residence_time_min": None})
+        sweeps.append(sweep)
+    return csds, sweeps
+
+
+def _product(time: float, crystallizer: Crystallizer) -> Csd:
+    return Csd(
+        label=f"{time:g} min",
+        residence_time_min=time,
+        truncate_below_volume_fraction=crystallizer.truncate_below_volume_fraction,
+    )
+
+
+def _of_kinetics(published: list[Published], kinetics: str, file: str) -> tuple[list[Published], list[str]]:
+    """Keep the published values of the study's kinetics or of none, with a warning about each other kinetics."""
+    others = dict.fromkeys(entry.kinetics for entry in published if entry.kinetics not in (None, kinetics))
+    kept = [entry for entry in published if entry.kinetics not in others]
+    counts = {other: sum(entry.kinetics == other for entry in published) for other in others}
+    return kept, [
+        f"{file}: published: {count} value{'' if count == 1 else 's'} of the kinetics {other} "
+        f"{'is' if count == 1 else 'are'} not shown: the study's crystallizer.kinetics = {kinetics}"
+        for other, count in counts.items()
+    ]
