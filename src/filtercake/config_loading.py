@@ -27,7 +27,7 @@ from filtercake.config import (
 from filtercake.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.csd import CrystalSizeDistribution, mixture, read_csd, truncate
 from filtercake.errors import ConfigError, CrystallizerError, CsdError, Problem
-from filtercake.products import resolve
+from filtercake.products import resolve, slurry_problems
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND, MINUTE
 
 LARGEST_FILE = 1_000_000
@@ -135,7 +135,7 @@ def load_study(path: Path) -> LoadedStudy:
     """
     model = parse(Study, read_yaml(path), str(path))
     model, kinetics, remarks = resolve(model, path)
-    problems = list(_reference_problems(model, str(path)))
+    problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
     csds: dict[str, LoadedCsd] = {}
     for name, csd in model.csds.items():
         try:
