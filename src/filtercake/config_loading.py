@@ -312,7 +312,7 @@ def _load_csd(
     else:
         classes = csd.mixture or []
         full = mixture([c.size_um * MICROMETRE for c in classes], [c.volume_fraction for c in classes])
-    truncated = truncate(full, csd.truncate_below_volume_fraction).csd
+    truncated = truncate(full, **csd.truncation).csd
     return LoadedCsd(full, truncated, csd.label or name, file, state)
 
 

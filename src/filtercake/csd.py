@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -17,6 +19,9 @@ from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, FloatArra
 
 SUM_TOLERANCE = 0.01
 """Volume fractions are normalised when their sum is within this of 1; further off is an error."""
+
+SAME_SIZE = 1e-9
+"""Relative difference of sizes that is rounding (20 um and 0.02 mm)."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +122,10 @@ class CrystalSizeDistribution:
         return counts
 
 
+FullAndTruncated: TypeAlias = tuple[CrystalSizeDistribution, CrystalSizeDistribution]
+"""A distribution, whole and as it is packed."""
+
+
 @dataclass(frozen=True)
 class Truncation:
     """A truncated distribution and the volume it kept.
@@ -133,23 +142,52 @@ class Truncation:
     kept_volume: float
 
 
-def truncate(csd: CrystalSizeDistribution, smallest_share: float) -> Truncation:
-    """Drop classes below a volume share and renormalise (paper section 3.1, Fig 5: 0.1 vol%).
+def truncate(
+    csd: CrystalSizeDistribution, smallest_share: float = 0.0, smallest: float = 0.0, largest: float = math.inf
+) -> Truncation:
+    """Drop classes below a volume share or beyond a size, and renormalise (paper section 3.1, Fig 5: 0.1 vol%).
+
+    Parameters
+    ----------
+    csd : CrystalSizeDistribution
+        The full distribution.
+    smallest_share : float
+        Volume share, of the full distribution, under which a class is dropped.
+    smallest, largest : float
+        Diameters, m, under and over which a class is dropped.
 
     Raises
     ------
     CsdError
         If nothing would be left.
     """
-    keep = csd.volume_fraction >= smallest_share
+    inside = (csd.size >= smallest * (1.0 - SAME_SIZE)) & (csd.size <= largest * (1.0 + SAME_SIZE))
+    keep = inside & (csd.volume_fraction >= smallest_share)
     if not keep.any():
-        raise CsdError(
-            f"truncation at {smallest_share:g} per class leaves no class: the largest class holds "
-            f"{csd.volume_fraction.max():.3g}; lower the truncation below that"
-        )
+        raise CsdError(_nothing_left(csd, inside, smallest_share, smallest, largest))
     kept = float(csd.volume_fraction[keep].sum())
     fractions = csd.volume_fraction[keep] / kept
     return Truncation(CrystalSizeDistribution(csd.size[keep], fractions), kept)
+
+
+def _nothing_left(
+    csd: CrystalSizeDistribution,
+    inside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    share: float,
+    smallest: float,
+    largest: float,
+) -> str:
+    sizes = f"between {smallest / MICROMETRE:g} and {largest / MICROMETRE:g} um"
+    if not inside.any():
+        return (
+            f"truncation leaves no class: none is {sizes}; "
+            f"the sizes run from {csd.smallest / MICROMETRE:g} to {csd.largest / MICROMETRE:g} um"
+        )
+    where = "" if inside.all() else f" {sizes}"
+    return (
+        f"truncation at {share:g} per class leaves no class: the largest class{where} holds "
+        f"{csd.volume_fraction[inside].max():.3g}; lower the truncation below that"
+    )
 
 
 def discretise(
@@ -240,7 +278,7 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
     )
 
 
-def from_table(table: pd.DataFrame) -> tuple[CrystalSizeDistribution, CrystalSizeDistribution]:
+def from_table(table: pd.DataFrame) -> FullAndTruncated:
     """Read back the full and the truncated distribution from :func:`to_table`'s columns.
 
     Raises

@@ -151,6 +151,8 @@ def _product(time: float, crystallizer: Crystallizer) -> Csd:
         label=f"{time:g} min",
         residence_time_min=time,
         truncate_below_volume_fraction=crystallizer.truncate_below_volume_fraction,
+        truncate_below_um=crystallizer.truncate_below_um,
+        truncate_above_um=crystallizer.truncate_above_um,
     )
 
 

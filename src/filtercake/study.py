@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from scipy import stats
 from filtercake import contact
 from filtercake.config import Study, Sweep
 from filtercake.config_loading import LoadedStudy
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.errors import PackingRejected
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.result import Packing, read_record
@@ -30,7 +30,13 @@ CONFIDENCE = 0.95
 SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
 """Properties a sweep may vary, besides the distribution."""
 
-MEASURED = ("porosity", "porosity_as_published", "resistance_m_kg", "resistance_sauter_m_kg")
+MEASURED = (
+    "porosity",
+    "porosity_as_published",
+    "resistance_m_kg",
+    "resistance_sauter_m_kg",
+    "resistance_truncated_m_kg",
+)
 
 POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", *SWEPT, "engine")
 REPLICATE_COLUMNS = (
@@ -63,6 +69,7 @@ SUMMARY_COLUMNS = (
     "resistance_ci95_m_kg",
     "resistance_sauter_m_kg",
     "resistance_sauter_ci95_m_kg",
+    "resistance_truncated_m_kg",
     "soft_contact_compaction",
     "overlap_max",
     "wall_s",
@@ -160,7 +167,7 @@ def points_table(points: Iterable[Point]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*POINT_COLUMNS, "replicates"])
 
 
-def replicate_row(point: Point, packing: Packing, csd: CrystalSizeDistribution, sphericity: float) -> dict[str, Any]:
+def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, sphericity: float) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
     Parameters
@@ -169,13 +176,13 @@ def replicate_row(point: Point, packing: Packing, csd: CrystalSizeDistribution, 
         Where it belongs.
     packing : Packing
         The packing.
-    csd : CrystalSizeDistribution
-        The full distribution: the resistance needs all of it.
+    csd : (CrystalSizeDistribution, CrystalSizeDistribution)
+        The full distribution, which the resistance needs all of, and the truncated one, for comparison.
     sphericity : float
         For the resistance law.
     """
     found, record = measure(packing, point.spec), packing.diagnostics
-    law = (csd, point.spec.density, sphericity)
+    (full, truncated), law = csd, (point.spec.density, sphericity)
     return {
         **point.row(),
         "replicate": record["replicate"],
@@ -185,8 +192,9 @@ def replicate_row(point: Point, packing: Packing, csd: CrystalSizeDistribution, 
         "settled": record["settled"],
         "porosity": found.interior,
         "porosity_as_published": found.as_published,
-        "resistance_m_kg": kozeny_carman(found.interior, *law),
-        "resistance_sauter_m_kg": carman_sauter(found.interior, *law),
+        "resistance_m_kg": kozeny_carman(found.interior, full, *law),
+        "resistance_sauter_m_kg": carman_sauter(found.interior, full, *law),
+        "resistance_truncated_m_kg": kozeny_carman(found.interior, truncated, *law),
         "porosity_from_floor": found.from_floor,
         "soft_contact_compaction": found.compaction,
         "overlap_max": record["overlap_max"],
@@ -206,7 +214,7 @@ def failed_row(point: Point, outcome: Outcome, reason: str) -> dict[str, Any]:
 
 
 def replicates_table(
-    points: Iterable[Point], packings: Path, csds: dict[str, CrystalSizeDistribution], sphericity: float
+    points: Iterable[Point], packings: Path, csds: Mapping[str, FullAndTruncated], sphericity: float
 ) -> pd.DataFrame:
     """Measure every packing of a study, ``REPLICATE_COLUMNS``; a failed or damaged one is a row with a reason.
 
@@ -216,8 +224,8 @@ def replicates_table(
         The study's points.
     packings : Path
         Folder with one folder per point.
-    csds : dict of str to CrystalSizeDistribution
-        The full distributions by name.
+    csds : mapping of str to (CrystalSizeDistribution, CrystalSizeDistribution)
+        The full and truncated distributions by name.
     sphericity : float
         For the resistance law.
     """

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.config import Published, Study
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.csd import FullAndTruncated
 from filtercake.drum_filter import Cake, DrumFilter, area, design_table
 from filtercake.errors import FilterError
 from filtercake.packing.cloud import box_length
@@ -16,7 +16,7 @@ from filtercake.resistance import kozeny_carman
 from filtercake.study import base_rows
 from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
 
-Csds = dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
+Csds = dict[str, FullAndTruncated]
 
 COMPARISON_COLUMNS = (
     "csd",
@@ -68,7 +68,7 @@ def table1(study: Study, csds: Csds) -> pd.DataFrame:
 
 
 def table2(study: Study, csds: Csds) -> pd.DataFrame:
-    """Tabulate what each distribution keeps when its rare classes are left out of the packing (paper, Table 2)."""
+    """Tabulate what each distribution keeps when classes are left out of the packing (paper, Table 2)."""
     rows = []
     for name, (full, truncated) in csds.items():
         kept = np.isin(full.size, truncated.size)
@@ -78,10 +78,13 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
                 "label": study.csds[name].label or name,
                 "residence_time_min": study.csds[name].residence_time_min,
                 "truncate_below_volume_fraction": study.csds[name].truncate_below_volume_fraction,
+                "truncate_below_um": study.csds[name].truncate_below_um,
+                "truncate_above_um": study.csds[name].truncate_above_um,
                 "classes": truncated.size.size,
                 "smallest_um": round(truncated.smallest / MICROMETRE, 2),
                 "largest_um": round(truncated.largest / MICROMETRE, 2),
                 "kept_volume_fraction": round(float(full.volume_fraction[kept].sum()), 5),
+                "discarded_volume_fraction": round(float(full.volume_fraction[~kept].sum()), 5),
                 "published_smallest_um": _value(published_value(study, name, "smallest_um", "simulation")),
                 "published_largest_um": _value(published_value(study, name, "largest_um", "simulation")),
             }

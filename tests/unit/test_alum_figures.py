@@ -200,6 +200,16 @@ class TestTruncation:
         assert "98.2 %" in first.texts[0].get_text() and "32.5 to 543.3 µm" in first.texts[0].get_text()
         assert [line.get_xdata()[0] for line in marked(first, "published")] == [32.5, 543.3]
 
+    def test_limits_of_size_are_drawn(self, data: StudyData) -> None:
+        limits = {"truncate_below_volume_fraction": 0.0, "truncate_below_um": 40.0, "truncate_above_um": 500.0}
+        model = data.study.csds["tau_15min"].model_copy(update=limits)
+        study = data.study.model_copy(update={"csds": {**data.study.csds, "tau_15min": model}})
+        first, second, *_ = draw("fig05_truncation", dataclasses.replace(data, study=study)).axes
+        assert [line.get_xdata()[0] for line in marked(first, "limit")] == [40.0, 500.0]
+        assert not marked(first, "threshold") and not marked(second, "limit")
+        alone = study.model_copy(update={"csds": {"tau_15min": model}})
+        assert "fig05_truncation" in figures_of([], alone)
+
     def test_at_most_four_panels(self, data: StudyData) -> None:
         model = data.study.model_copy(update={"csds": {**data.study.csds, "fifth": data.study.csds["tau_60min"]}})
         more = dataclasses.replace(data, study=model, csds={**data.csds, "fifth": data.csds["tau_60min"]})

@@ -227,6 +227,30 @@ def test_truncation_that_leaves_nothing_is_refused() -> None:
         truncate(mixture([10 * UM, 20 * UM], [0.5, 0.5]), 0.51)
 
 
+def test_truncation_by_size_keeps_both_ends() -> None:
+    csd = mixture([10 * UM, 20 * UM, 30 * UM, 40 * UM], [0.1, 0.2, 0.3, 0.4])
+    cut = truncate(csd, smallest=0.02e-3, largest=30 * UM)  # 0.02 mm is the 20 um
+    assert cut.csd.size / UM == pytest.approx([20, 30])
+    assert cut.csd.volume_fraction == pytest.approx([0.4, 0.6])
+    assert cut.kept_volume == pytest.approx(0.5)
+    assert truncate(csd, 0.25, largest=30 * UM).csd.size / UM == pytest.approx([30])  # shares are of the whole
+    assert (truncate(csd).csd.volume_fraction == csd.volume_fraction).all()
+
+
+@pytest.mark.parametrize(
+    ("limits", "says"),
+    [
+        ({"smallest": 41 * UM}, r"none is between 41 and inf um; the sizes run from 10 to 40 um"),
+        ({"largest": 9 * UM}, r"none is between 0 and 9 um"),
+        ({"smallest": 12 * UM, "largest": 19 * UM}, r"none is between 12 and 19 um"),
+        ({"smallest_share": 0.3, "largest": 20 * UM}, r"the largest class between 0 and 20 um holds 0\.2;"),
+    ],
+)
+def test_truncation_by_size_that_leaves_nothing_is_refused(limits: dict[str, float], says: str) -> None:
+    with pytest.raises(CsdError, match=says):
+        truncate(mixture([10 * UM, 20 * UM, 40 * UM], [0.1, 0.2, 0.7]), **limits)
+
+
 @given(distributions(), st.floats(0.0, 0.3))
 def test_truncation_keeps_what_it_says(csd: CrystalSizeDistribution, share: float) -> None:
     if csd.volume_fraction.max() < share:

@@ -94,6 +94,47 @@ def test_another_density_than_that_of_the_kinetics_is_doubted(changed: Callable[
     assert "material.density_kg_m3 = 1640: the kinetics ammonium_alum have 2450" in warning
 
 
+# --- truncation by size --------------------------------------------------------------------------------------------
+
+SIZES = "truncate_below_um: 40\n  truncate_above_um: 500"
+
+
+def test_the_crystallizer_s_products_are_truncated_by_size(changed: Callable[..., LoadedStudy]) -> None:
+    whole, cut = changed().csds["tau_15min"], changed("  slurry", f"  {SIZES}\n  slurry").csds["tau_15min"]
+    size = whole.truncated.size
+    assert cut.truncated.size.tolist() == size[(size >= 40e-6) & (size <= 500e-6)].tolist()
+    assert cut.full.size.tolist() == whole.full.size.tolist()
+
+
+def test_a_distribution_s_own_truncation_holds_for_it(changed: Callable[..., LoadedStudy]) -> None:
+    text = TEXT.replace(
+        "crystallizer:", "csds: {late: {residence_time_min: 60, truncate_above_um: 400}}\ncrystallizer:"
+    )
+    study = changed("  slurry", f"  {SIZES}\n  slurry", text)
+    assert study.csds["late"].truncated.largest < 400e-6 < study.csds["tau_60min"].truncated.largest
+    assert study.csds["late"].truncated.smallest < 40e-6
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "says"),
+    [
+        ("  slurry", "  truncate_below_um: 900\n  slurry", "csds.tau_15min.residence_time_min", "none is between 900"),
+        ("  slurry", "  truncate_below_um: 50\n  truncate_above_um: 50\n  slurry", "crystallizer", "must be below"),
+        ("  slurry", "  truncate_above_um: 0\n  slurry", "crystallizer.truncate_above_um", "greater than 0"),
+        (
+            "crystallizer:",
+            "csds: {a: {residence_time_min: 60, truncate_above_um: 4, truncate_below_um: 9}}\ncrystallizer:",
+            "csds.a",
+            "truncate_below_um must be below truncate_above_um",
+        ),
+    ],
+)
+def test_a_wrong_truncation_by_size_is_refused(
+    old: str, new: str, key: str, says: str, changed: Callable[..., LoadedStudy]
+) -> None:
+    assert says in problems(lambda: changed(old, new))[key]
+
+
 # --- refusals ------------------------------------------------------------------------------------------------------
 
 

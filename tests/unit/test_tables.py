@@ -15,6 +15,7 @@ from filtercake.study import expand, summarise
 from filtercake.tables import filter_design, published_value, table1, table2, table4
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+OTHER_RESISTANCES = ("resistance_sauter_m_kg", "resistance_truncated_m_kg")
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +63,14 @@ def test_table_2(alum_study: LoadedStudy) -> None:
         assert (row["published_smallest_um"], row["published_largest_um"]) == (smallest, largest)
         assert (row["smallest_um"], row["largest_um"]) == pytest.approx((smallest, largest), abs=0.06)
         assert row["kept_volume_fraction"] == pytest.approx(kept, abs=0.001)
+        assert row["kept_volume_fraction"] + row["discarded_volume_fraction"] == pytest.approx(1.0, abs=2e-5)
+
+
+def test_table_2_of_a_truncation_by_size(study_from, good_study: str) -> None:
+    study = study_from(good_study.replace("    mixture:", "    truncate_below_um: 30\n    mixture:"))
+    (row,) = table2(study.model, csds(study)).to_dict("records")
+    assert (row["truncate_below_um"], row["classes"], row["smallest_um"]) == (30.0, 1, 50.0)
+    assert (row["kept_volume_fraction"], row["discarded_volume_fraction"]) == (0.5, 0.5)
 
 
 def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> None:
@@ -75,7 +84,7 @@ def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> No
             row = {**point.row(), "status": "ok", "porosity": porosity, "porosity_as_published": porosity}
             rows.append({**row, "resistance_m_kg": alpha * (1 + 0.01 * sign)})
     replicates = pd.DataFrame(rows)
-    for column in ("resistance_sauter_m_kg", "soft_contact_compaction", "overlap_max", "wall_s"):
+    for column in (*OTHER_RESISTANCES, "soft_contact_compaction", "overlap_max", "wall_s"):
         replicates[column] = 1.0
     table = filter_design(alum_study.model, csds(alum_study), summarise(replicates)).set_index("csd")
     assert list(table["crystallizer_volume_m3"]) == pytest.approx([5, 10, 15, 20])
@@ -104,7 +113,7 @@ def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:
             porosity = 0.6
         rows.append({**point.row(), "status": "ok", "porosity": porosity - 0.01, "porosity_as_published": porosity})
     replicates = pd.DataFrame(rows)
-    for column in ("resistance_m_kg", "resistance_sauter_m_kg", "soft_contact_compaction", "overlap_max", "wall_s"):
+    for column in ("resistance_m_kg", *OTHER_RESISTANCES, "soft_contact_compaction", "overlap_max", "wall_s"):
         replicates[column] = 1.0
     table = table4(pmma_study.model, csds(pmma_study), summarise(replicates)).set_index("csd")
     assert list(table.index) == list(printed)

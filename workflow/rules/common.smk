@@ -126,7 +126,7 @@ def csd_params(wildcards):
     study = study_of(wildcards)
     csd, state = study.model.csds[wildcards.csd], study.csds[wildcards.csd].crystallizer
     classes = [[item.size_um, item.volume_fraction] for item in csd.mixture or []]
-    found = {"classes": classes, "truncation": csd.truncate_below_volume_fraction}
+    found = {"classes": classes, "truncation": csd.truncation}
     if state is not None:
         found["size_scale_um"] = state.size_scale / MICROMETRE
         found["bin_width_um"] = study.model.crystallizer.bin_width_um

@@ -83,7 +83,7 @@ def _varies(name: str) -> Callable[[list[Point]], bool]:
 
 
 def _truncates(study: Study) -> bool:
-    return any(csd.truncate_below_volume_fraction > 0.0 for csd in study.csds.values())
+    return any(csd.truncation for csd in study.csds.values())
 
 
 def _compares_products(study: Study) -> bool:
