@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
@@ -34,10 +34,15 @@ class CrystalSizeDistribution:
         Class diameters in m, ascending and distinct.
     volume_fraction : ndarray, shape (n,)
         Volume (= mass) fraction of each class, positive, sum 1.
+    x_over_d, x_over_d2 : ndarray, shape (n,), or None
+        What each class adds to the sums of x/d (1/m) and x/d^2 (1/m2), where its crystals are of several sizes;
+        None where all have the size of their class.
     """
 
     size: FloatArray
     volume_fraction: FloatArray
+    x_over_d: FloatArray | None = None
+    x_over_d2: FloatArray | None = None
 
     @classmethod
     def from_classes(cls, size: ArrayLike, volume_fraction: ArrayLike) -> CrystalSizeDistribution:
@@ -87,12 +92,12 @@ class CrystalSizeDistribution:
     @property
     def sum_x_over_d2(self) -> float:
         """Sum of x/d^2 over the classes, 1/m2: the size term of the paper's eq. 3."""
-        return float(np.sum(self.volume_fraction / self.size**2))
+        return float(np.sum(self.volume_fraction / self.size**2 if self.x_over_d2 is None else self.x_over_d2))
 
     @property
     def sum_x_over_d(self) -> float:
         """Sum of x/d over the classes, 1/m: one over the Sauter mean diameter."""
-        return float(np.sum(self.volume_fraction / self.size))
+        return float(np.sum(self.volume_fraction / self.size if self.x_over_d is None else self.x_over_d))
 
     @property
     def sauter_mean(self) -> float:
@@ -147,6 +152,8 @@ def truncate(
 ) -> Truncation:
     """Drop classes below a volume share or beyond a size, and renormalise (paper section 3.1, Fig 5: 0.1 vol%).
 
+    What is kept is what is packed: spheres of the size of their class.
+
     Parameters
     ----------
     csd : CrystalSizeDistribution
@@ -191,7 +198,10 @@ def _nothing_left(
 
 
 def discretise(
-    cumulative_volume: Callable[[FloatArray], FloatArray], upper: float, bin_width: float
+    cumulative_volume: Callable[[FloatArray], FloatArray],
+    upper: float,
+    bin_width: float,
+    cumulative_sums: Callable[[FloatArray], tuple[FloatArray, FloatArray]] | None = None,
 ) -> CrystalSizeDistribution:
     """Cut a continuous distribution into bins of about ``bin_width``, each class at its bin's centre.
 
@@ -203,6 +213,9 @@ def discretise(
         Largest diameter considered, m.
     bin_width : float
         Wanted bin width, m; the width used divides ``upper`` into a whole number of bins (rounded down).
+    cumulative_sums : callable or None
+        The sums of x/d (1/m) and x/d^2 (1/m2) up to given diameters, shape (n,) each: with them the classes add exactly
+        what the continuous distribution has, without them that of crystals at the bins' centres.
 
     Raises
     ------
@@ -216,7 +229,12 @@ def discretise(
     volume = np.diff(cumulative_volume(edges))
     if not volume.sum() > 0.0:
         raise CsdError(f"the distribution has no volume below {upper:g} m")
-    return CrystalSizeDistribution.from_classes(0.5 * (edges[1:] + edges[:-1]), volume / volume.sum())
+    fractions = volume / volume.sum()
+    csd = CrystalSizeDistribution.from_classes(0.5 * (edges[1:] + edges[:-1]), fractions)
+    if cumulative_sums is None:
+        return csd
+    over_d, over_d2 = (np.diff(sums)[fractions > 0.0] for sums in cumulative_sums(edges))
+    return replace(csd, x_over_d=over_d, x_over_d2=over_d2)
 
 
 def read_csd(path: Path) -> CrystalSizeDistribution:
@@ -261,7 +279,7 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
     Returns
     -------
     DataFrame
-        Columns size_um, volume_fraction, number_fraction, truncated_volume_fraction,
+        Columns size_um, volume_fraction, number_fraction, x_over_d_1_m, x_over_d2_1_m2, truncated_volume_fraction,
         truncated_number_fraction; one row per class of the full distribution.
     """
     inside = np.isin(full.size, truncated.size)
@@ -272,6 +290,8 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
             "size_um": full.size / MICROMETRE,
             "volume_fraction": full.volume_fraction,
             "number_fraction": full.number_fraction,
+            "x_over_d_1_m": full.volume_fraction / full.size if full.x_over_d is None else full.x_over_d,
+            "x_over_d2_1_m2": full.volume_fraction / full.size**2 if full.x_over_d2 is None else full.x_over_d2,
             "truncated_volume_fraction": volume,
             "truncated_number_fraction": number,
         }
@@ -286,11 +306,14 @@ def from_table(table: pd.DataFrame) -> FullAndTruncated:
     CsdError
         If a column is missing or the classes are not a distribution.
     """
-    missing = {"size_um", "volume_fraction", "truncated_volume_fraction"} - set(table.columns)
+    needed = {"size_um", "volume_fraction", "x_over_d_1_m", "x_over_d2_1_m2", "truncated_volume_fraction"}
+    missing = needed - set(table.columns)
     if missing:
         raise CsdError(f"the table of a size distribution lacks the columns {', '.join(sorted(missing))}")
     size = table["size_um"].to_numpy(np.float64) * MICROMETRE
     full = CrystalSizeDistribution.from_classes(size, table["volume_fraction"].to_numpy(np.float64))
+    over_d, over_d2 = (table[name].to_numpy(np.float64) for name in ("x_over_d_1_m", "x_over_d2_1_m2"))
+    full = replace(full, x_over_d=over_d, x_over_d2=over_d2)
     truncated = CrystalSizeDistribution.from_classes(size, table["truncated_volume_fraction"].to_numpy(np.float64))
     return full, truncated
 

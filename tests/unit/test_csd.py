@@ -275,6 +275,19 @@ def test_table_round_trip(csd: CrystalSizeDistribution, share: float) -> None:
         assert after.volume_fraction == pytest.approx(before.volume_fraction, rel=1e-12)
 
 
+def test_a_table_keeps_what_the_classes_add_to_the_sums(tmp_path: Path) -> None:
+    # between 0 and 10 um, uniform in volume: sum x/d diverges at 0, so that these sums are made up
+    sums = (lambda size: 3e5 * size / (10 * UM), lambda size: 4e10 * (size / (10 * UM)) ** 2)
+    csd = discretise(lambda size: size / (10 * UM), 10 * UM, 2.5 * UM, lambda size: (sums[0](size), sums[1](size)))
+    assert (csd.sum_x_over_d, csd.sum_x_over_d2) == pytest.approx((3e5, 4e10), rel=1e-14)
+    to_table(csd, truncate(csd, largest=8 * UM).csd).to_csv(tmp_path / "csd.csv", index=False)
+    full, truncated = from_table(pd.read_csv(tmp_path / "csd.csv"))
+    assert full.x_over_d2 == pytest.approx(csd.x_over_d2)
+    assert (full.sum_x_over_d, full.sum_x_over_d2) == pytest.approx((3e5, 4e10), rel=1e-14)
+    assert truncated.x_over_d is None
+    assert truncated.sum_x_over_d == pytest.approx(float(np.sum(1.0 / 3.0 / truncated.size)), rel=1e-12)
+
+
 def test_table_lists_left_out_classes_with_zero() -> None:
     full = mixture([10 * UM, 20 * UM], [0.01, 0.99])
     table = to_table(full, truncate(full, 0.1).csd)
@@ -282,6 +295,8 @@ def test_table_lists_left_out_classes_with_zero() -> None:
     assert table["truncated_volume_fraction"].tolist() == [0.0, 1.0]
     assert table["truncated_number_fraction"].tolist() == [0.0, 1.0]
     assert table["number_fraction"].sum() == pytest.approx(1.0, abs=1e-15)
+    assert table["x_over_d_1_m"].sum() == pytest.approx(full.sum_x_over_d, rel=1e-14)
+    assert table["x_over_d2_1_m2"].sum() == pytest.approx(full.sum_x_over_d2, rel=1e-14)
 
 
 def test_the_same_table_on_disk_is_the_same_distribution(tmp_path: Path, alum) -> None:

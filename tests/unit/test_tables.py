@@ -90,8 +90,7 @@ def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> No
     assert list(table["crystallizer_volume_m3"]) == pytest.approx([5, 10, 15, 20])
     for name, (_, area) in printed.items():
         row = table.loc[name]
-        # the classes hold 0.5 % more x/d2 than the closed form that the printed areas follow from
-        assert row["filter_area_m2"] == pytest.approx(area, rel=0.004)
+        assert row["filter_area_m2"] == pytest.approx(area, rel=0.002)
         assert row["filter_area_low_m2"] < row["filter_area_m2"] < row["filter_area_high_m2"]
         assert 0.50 < row["medium_share"] < 0.60
     # the paper's text gives the first and the last
