@@ -23,7 +23,7 @@ from filtercake.packing.result import Packing, read_record
 from filtercake.packing.spec import PackingSpec, digest
 from filtercake.porosity import measure
 from filtercake.resistance import carman_sauter, kozeny_carman
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE, tidy
 
 CONFIDENCE = 0.95
 
@@ -117,11 +117,11 @@ class Point:
             "study": self.study,
             "csd": self.csd,
             "residence_time_min": np.nan if self.residence_time_min is None else self.residence_time_min,
-            "cohesion_kJ_m3": _tidy(self.spec.cohesion / KILOJOULE_PER_M3),
+            "cohesion_kJ_m3": tidy(self.spec.cohesion / KILOJOULE_PER_M3),
             "friction": self.spec.friction,
             "poisson_ratio": self.spec.poisson_ratio,
             "restitution": self.spec.restitution,
-            "youngs_modulus_MPa": _tidy(self.spec.youngs_modulus / MEGAPASCAL),
+            "youngs_modulus_MPa": tidy(self.spec.youngs_modulus / MEGAPASCAL),
             "engine": self.spec.engine,
         }
 
@@ -358,8 +358,3 @@ def _slug(csd_name: str, swept: dict[str, float], study: Study, spec: PackingSpe
     decisive = {key: value for key, value in asdict(spec).items() if key not in idle}
     code = digest(decisive, csd.size.tolist(), csd.volume_fraction.tolist())[:8]
     return re.sub(r"[^A-Za-z0-9_.-]", "-", "_".join([*parts, code]))
-
-
-def _tidy(value: float) -> float:
-    """Undo the last bit lost in a change of unit, so that 50 kJ/m3 is written 50.0."""
-    return float(f"{value:.12g}")

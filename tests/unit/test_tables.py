@@ -9,10 +9,18 @@ import pandas as pd
 import pytest
 
 from filtercake.config_loading import LoadedStudy, load_study
-from filtercake.errors import FilterError
+from filtercake.errors import CrystallizerError, FilterError
 from filtercake.resistance import kozeny_carman
 from filtercake.study import expand, summarise
-from filtercake.tables import filter_design, published_value, table1, table2, table4
+from filtercake.tables import (
+    CRYSTALLIZER_COLUMNS,
+    crystallizer_table,
+    filter_design,
+    published_value,
+    table1,
+    table2,
+    table4,
+)
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 OTHER_RESISTANCES = ("resistance_sauter_m_kg", "resistance_truncated_m_kg")
@@ -71,6 +79,28 @@ def test_table_2_of_a_truncation_by_size(study_from, good_study: str) -> None:
     (row,) = table2(study.model, csds(study)).to_dict("records")
     assert (row["truncate_below_um"], row["classes"], row["smallest_um"]) == (30.0, 1, 50.0)
     assert (row["kept_volume_fraction"], row["discarded_volume_fraction"]) == (0.5, 0.5)
+
+
+def test_the_crystallizer(alum_study: LoadedStudy) -> None:
+    states = {name: loaded.crystallizer for name, loaded in reversed(alum_study.csds.items()) if loaded.crystallizer}
+    table = crystallizer_table(alum_study.model, states, csds(alum_study))
+    assert tuple(table.columns) == CRYSTALLIZER_COLUMNS
+    assert table["csd"].to_list() == list(TIMES)
+    assert table["kinetics"].unique().tolist() == ["ammonium_alum"]
+    assert table["residence_time_min"].to_list() == [15.0, 30.0, 45.0, 60.0]
+    assert table["crystallizer_volume_m3"].to_list() == [5.0, 10.0, 15.0, 20.0]
+    scale = [58.417, 67.103, 72.771, 77.081]
+    assert table["size_scale_um"].to_list() == pytest.approx(scale, abs=5e-4)
+    assert table["mass_mean_size_um"].to_list() == pytest.approx([4.0 * value for value in scale], abs=2e-3)
+    assert table["growth_rate_m_s"].to_list() == pytest.approx([6.4907e-8, 3.7279e-8, 2.6952e-8, 2.1411e-8], rel=3e-5)
+    rates = [7.5833e4, 2.5016e4, 1.3076e4, 8.2521e3]
+    assert table["nucleation_rate_1_L_s"].to_list() == pytest.approx(rates, rel=5e-5)
+    assert table["kept_volume_fraction"].to_list() == pytest.approx([0.981, 0.979, 0.977, 0.976], abs=0.001)
+
+
+def test_a_study_without_a_crystallizer_has_no_table_of_it(pmma_study: LoadedStudy) -> None:
+    with pytest.raises(CrystallizerError, match="has no crystallizer"):
+        crystallizer_table(pmma_study.model, {}, csds(pmma_study))
 
 
 def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> None:

@@ -118,6 +118,19 @@ def filter_tables(wildcards):
     return [f"{RESULTS}/{wildcards.study}/tables/filter.csv"] if has_one else []
 
 
+def crystallizer_tables(wildcards):
+    """The crystallizer's table, where the study has a crystallizer."""
+    has_one = study_of(wildcards).model.crystallizer is not None
+    folder = f"{RESULTS}/{wildcards.study}/tables"
+    return [f"{folder}/crystallizer.csv"] if has_one else []
+
+
+def crystallizer_states(wildcards):
+    """The crystallizer behind each of its products, as plain values."""
+    csds = study_of(wildcards).csds.items()
+    return {name: vars(csd.crystallizer) for name, csd in csds if csd.crystallizer}
+
+
 def figures_of(study):
     return catalogue.figures_of(KNOWN_POINTS[study].values(), KNOWN[study].model)
 
