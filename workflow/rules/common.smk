@@ -22,6 +22,7 @@ from filtercake.packing.result import read_record
 from filtercake.provenance import packing_sources, sources
 from filtercake.study import expand as expand_points, with_engine
 from filtercake.units import MICROMETRE
+from snakemake.exceptions import WorkflowError
 
 ROOT = Path(workflow.basedir)
 CONFIG_FILE = "config/config.yaml"
