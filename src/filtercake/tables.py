@@ -284,12 +284,13 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
 
     ``sd`` is the standard deviation of one packing, pooled over the study's points of the same engine: a few
     replicates of one point say little about it. ``deviation_sd`` is the published value's distance from our mean
-    in these: a published value is one packing (or a few), so that within three of them it is no different.
+    in these: a published value is one packing (or a few), so that within three of them it is no different. Both are
+    blank where no point of the engine has two packings.
     """
     good = replicates[replicates["status"] == "ok"]
     spread = good.groupby(["engine", "point"])["porosity_as_published"].agg(["var", "count"]).dropna()
     weight = spread["count"] - 1
-    pooled = np.sqrt((spread["var"] * weight).groupby("engine").sum() / weight.groupby("engine").sum())
+    pooled = ((spread["var"] * weight).groupby("engine").sum() / weight.groupby("engine").sum()) ** 0.5
     rows = []
     for entry in study.published:
         if entry.quantity != "porosity" or entry.cohesion_kJ_m3 is None or entry.friction is None:
@@ -300,12 +301,13 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
         for name in ("poisson_ratio", "restitution", "youngs_modulus_MPa"):
             here &= np.isclose(replicates[name], getattr(study.material, name))
         values = replicates.loc[here, "porosity_as_published"].to_numpy(np.float64)
-        if values.size < 2:
+        if not values.size:
             continue
-        mean, sd = float(values.mean()), float(pooled[replicates.loc[here, "engine"].iloc[0]])
+        engine = str(replicates.loc[here, "engine"].iloc[0])
+        mean, sd = float(values.mean()), float(pooled.get(engine, np.nan))
         rows.append(
             (
-                *(entry.csd, entry.cohesion_kJ_m3, entry.friction, replicates.loc[here, "engine"].iloc[0]),
+                *(entry.csd, entry.cohesion_kJ_m3, entry.friction, engine),
                 *(entry.source, entry.value, values.size, mean, sd, (entry.value - mean) / sd),
                 float(replicates.loc[here, "porosity"].mean()),
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import nan
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -13,7 +14,9 @@ from filtercake.errors import CrystallizerError, FilterError
 from filtercake.resistance import kozeny_carman
 from filtercake.study import expand, summarise
 from filtercake.tables import (
+    COMPARISON_COLUMNS,
     CRYSTALLIZER_COLUMNS,
+    comparison,
     crystallizer_table,
     filter_design,
     published_value,
@@ -169,3 +172,32 @@ published:
     assert (simulated.value, measured.value) == (0.359, 0.35)  # the first
     assert published_value(study, "bimodal", "resistance_m_kg", "measurement") is None
     assert published_value(study, "other", "porosity", "measurement") is None
+
+
+def packings(study: LoadedStudy, porosities: dict[str, list[float]]) -> pd.DataFrame:
+    """Replicates of a study's points, porosity by the paper's count; the interior's is 0.01 less."""
+    return pd.DataFrame(
+        [
+            {**point.row(), "status": "ok", "porosity": value - 0.01, "porosity_as_published": value}
+            for point in expand(study, lambda _csd, _n: "embedded")
+            for value in porosities.get(point.csd, [])
+        ]
+    )
+
+
+def test_published_porosities_beside_one_packing_have_a_blank_spread(alum_study: LoadedStudy) -> None:
+    table = comparison(alum_study.model, packings(alum_study, {"tau_15min": [0.296]}))
+    assert tuple(table.columns) == COMPARISON_COLUMNS
+    (row,) = table.to_dict("records")
+    assert (row["csd"], row["n"], row["published"], row["engine"]) == ("tau_15min", 1, 0.293, "embedded")
+    assert (row["porosity_as_published"], row["porosity"]) == pytest.approx((0.296, 0.286))
+    assert np.isnan(row["sd"]) and np.isnan(row["deviation_sd"])
+
+
+def test_one_packing_is_held_against_the_other_points_spread(alum_study: LoadedStudy) -> None:
+    made = packings(alum_study, {"tau_15min": [0.296], "tau_30min": [0.29, 0.294], "tau_45min": [0.29, 0.298]})
+    table = comparison(alum_study.model, made).set_index("csd")
+    assert table["n"].to_dict() == {"tau_15min": 1, "tau_30min": 2, "tau_45min": 2}
+    sd = (0.5 * (0.002**2 * 2 + 0.004**2 * 2)) ** 0.5
+    assert table["sd"].to_list() == pytest.approx([sd] * 3)
+    assert table.loc["tau_15min", "deviation_sd"] == pytest.approx((0.293 - 0.296) / sd)
