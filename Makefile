@@ -78,8 +78,8 @@ agreement: setup ## both engines on the same clouds, nine cases (about 45 min on
 twin: setup ## twenty calibrations whose answer is known, with and without friction (about 30 min on 2 cores)
 	$(SNAKEMAKE) twin
 
-bed-size: setup ## several beds of N = 20 000 against one of N = 100 000, alum (about 10 min)
-	$(SNAKEMAKE) bed_size --config studies=alum,alum_full
+bed-size: setup ## several beds of N = 25 000 against one of N = 100 000, alum (about 10 min)
+	$(SNAKEMAKE) bed_size
 
 references: setup ## remake the stored LIGGGHTS trajectories that the tests compare the embedded engine with
 	$(BIN)/python tests/data/force_scenes.py

@@ -172,13 +172,14 @@ def load_calibrations(names: Iterable[str], folder: Path, studies: Path, file: s
     """
     problems: list[Problem] = []
     loaded: list[LoadedCalibration] = []
-    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    paths: dict[str, Path] = {}
     for index, name in enumerate(names):
         path = Path(name) if name.endswith((".yaml", ".yml")) else folder / f"{name}.yaml"
-        if not NAME.match(path.stem) or not path.is_file():
-            allowed = f"no such calibration; allowed: {', '.join(known)}, or the path of a calibration file"
+        allowed = _path_problem(path, paths.get(path.stem), folder)
+        if allowed:
             problems.append(Problem(file, f"calibrations[{index}]", repr(name), allowed))
             continue
+        paths[path.stem] = path
         try:
             loaded.append(load_calibration(path, studies))
         except ConfigError as error:
@@ -186,6 +187,18 @@ def load_calibrations(names: Iterable[str], folder: Path, studies: Path, file: s
     if problems:
         raise ConfigError(problems)
     return loaded
+
+
+def _path_problem(path: Path, same: Path | None, folder: Path) -> str:
+    """Say what is wrong with the path of a calibration; ``same`` is another of its name. Empty where all is well."""
+    if not NAME.match(path.stem):
+        return "the file's name must be letters, digits, - and _, starting with a letter or digit, at most 64 long"
+    if not path.is_file():
+        known = sorted(entry.stem for entry in folder.glob("*.yaml"))
+        return f"no such calibration; allowed: {', '.join(known)}, or the path of a calibration file"
+    if same is not None:
+        return f"{same} and {path} would both be called calibration_{path.stem}; rename one file"
+    return ""
 
 
 def load_calibration(path: Path, studies: Path) -> LoadedCalibration:

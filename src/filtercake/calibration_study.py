@@ -26,7 +26,7 @@ from filtercake.calibration import (
     next_cohesions,
     predict,
 )
-from filtercake.csd import CrystalSizeDistribution, from_table
+from filtercake.csd import CrystalSizeDistribution, FullAndTruncated, from_table
 from filtercake.drum_filter import DrumFilter, area
 from filtercake.errors import CalibrationError
 from filtercake.resistance import implied_porosity, kozeny_carman
@@ -181,17 +181,22 @@ class Task:
         """Tabulate the packings of the points named (see :func:`simulate`); ``tables`` are the CSD files."""
         wanted = set(names)
         chosen = [c for c in self.candidates if c.point.name in wanted]
-        return simulate(chosen, packings, self.full_csds(tables), self.settings)
+        return simulate(chosen, packings, read_csds(tables), self.settings)
 
     def full_csds(self, tables: Iterable[str]) -> dict[str, CrystalSizeDistribution]:
         """Read the full distributions from their files, by name."""
-        return {Path(table).stem: from_table(pd.read_csv(table))[0] for table in tables}
+        return {name: full for name, (full, _) in read_csds(tables).items()}
+
+
+def read_csds(tables: Iterable[str]) -> dict[str, FullAndTruncated]:
+    """Read the distributions, full and truncated, from their files, by name."""
+    return {Path(table).stem: from_table(pd.read_csv(table)) for table in tables}
 
 
 def simulate(
     candidates: Iterable[Candidate],
     packings: Path,
-    csds: Mapping[str, CrystalSizeDistribution],
+    csds: Mapping[str, FullAndTruncated],
     settings: Settings,
 ) -> pd.DataFrame:
     """Tabulate every packing made, with its ln(alpha) by the estimator asked for.
@@ -202,12 +207,12 @@ def simulate(
         The rows of :func:`filtercake.study.replicates_table` with the columns batch and ln_resistance.
     """
     listed = list(candidates)
-    table = replicates_table([c.point for c in listed], packings, dict(csds), settings.sphericity)
+    table = replicates_table([c.point for c in listed], packings, csds, settings.sphericity)
     batches = {c.point.name: c.batch for c in listed}
     table["batch"] = table["point"].map(batches)
     porosity = table["porosity" if settings.estimator == "interior" else "porosity_as_published"]
     table["ln_resistance"] = [
-        math.log(kozeny_carman(value, csds[str(csd)], settings.density, settings.sphericity))
+        math.log(kozeny_carman(value, csds[str(csd)][0], settings.density, settings.sphericity))
         if np.isfinite(value)
         else np.nan
         for value, csd in zip(porosity.to_list(), table["csd"], strict=True)

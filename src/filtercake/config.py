@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from filtercake import fence
 from filtercake.fence import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
-from filtercake.units import MICROSECOND
+from filtercake.units import MICROMETRE, MICROSECOND
 
 SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
 """Properties a sweep may vary, besides the distribution."""
@@ -67,6 +67,7 @@ Restitution = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER
 Friction = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False), TO_NUMBER]
 Cohesion = Annotated[float, Field(ge=0, allow_inf_nan=False), TO_NUMBER]
 
+TruncationSize = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False), TO_NUMBER]
 ResidenceTime = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False), TO_NUMBER]
 
 EngineName = Literal["auto", "liggghts", "embedded", "liggghts_as_published"]
@@ -76,6 +77,11 @@ class Model(BaseModel):
     """Base of all parts: unknown keys are errors, values do not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _check_ends(below: float | None, above: float | None) -> None:
+    if below is not None and above is not None and not below < above:
+        raise ValueError("truncate_below_um must be below truncate_above_um")
 
 
 class SizeClass(Model):
@@ -111,12 +117,27 @@ class Csd(Model):
         default=0.0,
         description="Classes below this volume share are left out of the packing (not of the resistance).",
     )
+    truncate_below_um: TruncationSize | None = Field(
+        default=None, description="Classes of smaller crystals than this, um, are left out of the packing likewise."
+    )
+    truncate_above_um: TruncationSize | None = Field(
+        default=None, description="Classes of larger crystals than this, um, are left out of the packing likewise."
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Csd:
         if [self.mixture, self.file, self.residence_time_min].count(None) != 2:
             raise ValueError("needs exactly one of mixture, file and residence_time_min")
+        _check_ends(self.truncate_below_um, self.truncate_above_um)
         return self
+
+    @property
+    def truncation(self) -> dict[str, float]:
+        """What is left out of the packing, as keywords of :func:`filtercake.csd.truncate`; empty for nothing."""
+        found = {"smallest_share": self.truncate_below_volume_fraction}
+        for name, size in (("smallest", self.truncate_below_um), ("largest", self.truncate_above_um)):
+            found[name] = (size or 0.0) * MICROMETRE
+        return {name: value for name, value in found.items() if value > 0.0}
 
 
 class Crystallizer(Model):
@@ -138,6 +159,17 @@ class Crystallizer(Model):
     truncate_below_volume_fraction: Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.001, description="Classes below this volume share are left out of the packing, not of the resistance."
     )
+    truncate_below_um: TruncationSize | None = Field(
+        default=None, description="Classes of smaller crystals than this, um, are left out of the packing likewise."
+    )
+    truncate_above_um: TruncationSize | None = Field(
+        default=None, description="Classes of larger crystals than this, um, are left out of the packing likewise."
+    )
+
+    @model_validator(mode="after")
+    def _ends(self) -> Crystallizer:
+        _check_ends(self.truncate_below_um, self.truncate_above_um)
+        return self
 
 
 class Filter(Model):
@@ -313,6 +345,9 @@ class Published(Model):
     kind: Literal["simulation", "measurement"] = Field(description="Simulated or measured.")
     cohesion_kJ_m3: Cohesion | None = Field(default=None, description="At this cohesion, kJ/m3.")  # noqa: N815
     friction: Friction | None = Field(default=None, description="At this friction.")
+    kinetics: Name | None = Field(
+        default=None, description="Of the product of these kinetics; not shown beside crystals of others."
+    )
     particles: Annotated[int, Field(ge=1), TO_WHOLE] | None = Field(
         default=None, description="For this number of spheres (system_dimension_um), if not the study's."
     )

@@ -22,16 +22,10 @@ from filtercake.config import (
     Study,
     Workflow,
 )
-from filtercake.crystallizer import (
-    Kinetics,
-    SteadyState,
-    crystal_size_distribution,
-    get_kinetics,
-    load_kinetics,
-    steady_state,
-)
+from filtercake.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.csd import CrystalSizeDistribution, mixture, read_csd, truncate
 from filtercake.errors import ConfigError, CrystallizerError, CsdError, Problem
+from filtercake.products import resolve, slurry_problems
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
 
 LARGEST_FILE = 1_000_000
@@ -138,8 +132,8 @@ def load_study(path: Path) -> LoadedStudy:
         With every problem found in the file and the files it names.
     """
     model = parse(Study, read_yaml(path), str(path))
-    model, kinetics = _resolve_crystallizer(model, path)
-    problems = list(_reference_problems(model, str(path)))
+    model, kinetics, remarks = resolve(model, path)
+    problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
     csds: dict[str, LoadedCsd] = {}
     for name, csd in model.csds.items():
         try:
@@ -149,7 +143,7 @@ def load_study(path: Path) -> LoadedStudy:
     problems += _stability_problems(model, csds, str(path))
     if problems:
         raise ConfigError(problems)
-    return LoadedStudy(path.stem, path, model, csds, tuple(_doubts(model, csds, str(path))))
+    return LoadedStudy(path.stem, path, model, csds, (*remarks, *_doubts(model, csds, str(path))))
 
 
 def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
@@ -294,66 +288,6 @@ def _did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def product_name(residence_time_min: float) -> str:
-    """Name of the crystallizer's product at a residence time, as a distribution of the study."""
-    return f"tau_{residence_time_min:g}min".replace(".", "p")
-
-
-def _resolve_crystallizer(model: Study, path: Path) -> tuple[Study, Kinetics | None]:
-    """Give the residence times of sweeps a distribution each, and the material the kinetics' density if it has none.
-
-    Raises
-    ------
-    ConfigError
-        If the kinetics are not known, or residence times or a density are asked for that nothing gives.
-    """
-    file = str(path)
-    crystallizer, material = model.crystallizer, model.material
-    if crystallizer is None:
-        asked = [f"csds.{name}" for name, csd in model.csds.items() if csd.residence_time_min is not None]
-        asked += [f"sweeps[{i}]" for i, sweep in enumerate(model.sweeps) if sweep.residence_time_min is not None]
-        problems = [
-            Problem(file, f"{key}.residence_time_min", "", "needs a crystallizer in the study") for key in asked
-        ]
-        if model.filter is not None:
-            problems.append(Problem(file, "filter", "", "needs a crystallizer in the study, for its slurry"))
-        if material.density_kg_m3 is None:
-            problems.append(Problem(file, "material.density_kg_m3", "(missing)", "must be given"))
-        if problems:
-            raise ConfigError(problems)
-        return model, None
-    kinetics = _kinetics(crystallizer, path)
-    if material.density_kg_m3 is None:
-        material = material.model_copy(update={"density_kg_m3": kinetics.density})
-    csds, sweeps = dict(model.csds), []
-    for sweep in model.sweeps:
-        times = sweep.residence_time_min
-        if times is not None:
-            for time in times:
-                name = product_name(time)
-                csds.setdefault(
-                    name,
-                    Csd(
-                        label=f"{time:g} min",
-                        residence_time_min=time,
-                        truncate_below_volume_fraction=crystallizer.truncate_below_volume_fraction,
-                    ),
-                )
-            sweep = sweep.model_copy(update={"csd": [product_name(time) for time in times], "residence_time_min": None})
-        sweeps.append(sweep)
-    return model.model_copy(update={"csds": csds, "sweeps": sweeps, "material": material}), kinetics
-
-
-def _kinetics(crystallizer: Crystallizer, path: Path) -> Kinetics:
-    try:
-        own = load_kinetics(path.parent / crystallizer.kinetics_file) if crystallizer.kinetics_file else None
-        return get_kinetics(crystallizer.kinetics, own)
-    except CrystallizerError as error:
-        asked = repr(crystallizer.kinetics)
-        allowed = str(error).removeprefix(f"kinetics = {asked}: ")
-        raise ConfigError([Problem(str(path), "crystallizer.kinetics", asked, allowed)]) from None
-
-
 def _source_of(name: str, csd: Csd) -> tuple[str, str]:
     """Key and value that a distribution comes from."""
     if csd.file:
@@ -376,7 +310,7 @@ def _load_csd(
     else:
         classes = csd.mixture or []
         full = mixture([c.size_um * MICROMETRE for c in classes], [c.volume_fraction for c in classes])
-    truncated = truncate(full, csd.truncate_below_volume_fraction).csd
+    truncated = truncate(full, **csd.truncation).csd
     return LoadedCsd(full, truncated, csd.label or name, file, state)
 
 

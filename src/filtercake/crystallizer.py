@@ -270,10 +270,39 @@ def sum_x_over_d2(size_scale: float) -> float:
     return 1.0 / (6.0 * _checked("size_scale", size_scale, _positive) ** 2)
 
 
+def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Sum x/d (1/m) and x/d^2 (1/m2) over the crystals smaller than L.
+
+    The integrals of w/L and w/L^2 up to L are ``P(3, L/a)/(3 a)`` and ``P(2, L/a)/(6 a^2)`` with ``a = G tau``.
+
+    Parameters
+    ----------
+    size_scale : float
+        G tau, m.
+    size : array_like, shape (...)
+        Sizes L, m.
+
+    Returns
+    -------
+    tuple of ndarray, shape (...) each
+
+    Raises
+    ------
+    CrystallizerError
+        If the size scale is not positive and finite, or a size is negative or not finite.
+    """
+    a = _checked("size_scale", size_scale, _positive)
+    scaled = _sizes(size) / a
+    return np.asarray(gammainc(3.0, scaled) / (3.0 * a)), np.asarray(gammainc(2.0, scaled) / (6.0 * a**2))
+
+
 def crystal_size_distribution(
     size_scale: float, bin_width: float = BIN_WIDTH, upper_scales: float = UPPER_SCALES
 ) -> CrystalSizeDistribution:
     """Cut the product into size classes of about ``bin_width`` (paper section 3.1, Fig 5, before truncation).
+
+    Every class adds to the sums of x/d and x/d^2 what its crystals do, not what as many at its centre would: that
+    would be 0.5 % more resistance for the paper's alum.
 
     Parameters
     ----------
@@ -298,7 +327,12 @@ def crystal_size_distribution(
             f"size_scale = {size_scale:g} m: cannot be cut into classes of {width:g} m up to {upper:g} m; "
             f"at most {MOST_CLASSES} classes are allowed"
         )
-    return discretise(lambda size: cumulative_volume(size_scale, size), upper, width)
+    return discretise(
+        lambda size: cumulative_volume(size_scale, size),
+        upper,
+        width,
+        lambda size: cumulative_sums(size_scale, size),
+    )
 
 
 def load_kinetics(path: Path | None = None) -> dict[str, Kinetics]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -17,6 +19,9 @@ from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, FloatArra
 
 SUM_TOLERANCE = 0.01
 """Volume fractions are normalised when their sum is within this of 1; further off is an error."""
+
+SAME_SIZE = 1e-9
+"""Relative difference of sizes that is rounding (20 um and 0.02 mm)."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +34,15 @@ class CrystalSizeDistribution:
         Class diameters in m, ascending and distinct.
     volume_fraction : ndarray, shape (n,)
         Volume (= mass) fraction of each class, positive, sum 1.
+    x_over_d, x_over_d2 : ndarray, shape (n,), or None
+        What each class adds to the sums of x/d (1/m) and x/d^2 (1/m2), where its crystals are of several sizes;
+        None where all have the size of their class.
     """
 
     size: FloatArray
     volume_fraction: FloatArray
+    x_over_d: FloatArray | None = None
+    x_over_d2: FloatArray | None = None
 
     @classmethod
     def from_classes(cls, size: ArrayLike, volume_fraction: ArrayLike) -> CrystalSizeDistribution:
@@ -82,12 +92,12 @@ class CrystalSizeDistribution:
     @property
     def sum_x_over_d2(self) -> float:
         """Sum of x/d^2 over the classes, 1/m2: the size term of the paper's eq. 3."""
-        return float(np.sum(self.volume_fraction / self.size**2))
+        return float(np.sum(self.volume_fraction / self.size**2 if self.x_over_d2 is None else self.x_over_d2))
 
     @property
     def sum_x_over_d(self) -> float:
         """Sum of x/d over the classes, 1/m: one over the Sauter mean diameter."""
-        return float(np.sum(self.volume_fraction / self.size))
+        return float(np.sum(self.volume_fraction / self.size if self.x_over_d is None else self.x_over_d))
 
     @property
     def sauter_mean(self) -> float:
@@ -117,6 +127,10 @@ class CrystalSizeDistribution:
         return counts
 
 
+FullAndTruncated: TypeAlias = tuple[CrystalSizeDistribution, CrystalSizeDistribution]
+"""A distribution, whole and as it is packed."""
+
+
 @dataclass(frozen=True)
 class Truncation:
     """A truncated distribution and the volume it kept.
@@ -133,27 +147,61 @@ class Truncation:
     kept_volume: float
 
 
-def truncate(csd: CrystalSizeDistribution, smallest_share: float) -> Truncation:
-    """Drop classes below a volume share and renormalise (paper section 3.1, Fig 5: 0.1 vol%).
+def truncate(
+    csd: CrystalSizeDistribution, smallest_share: float = 0.0, smallest: float = 0.0, largest: float = math.inf
+) -> Truncation:
+    """Drop classes below a volume share or beyond a size, and renormalise (paper section 3.1, Fig 5: 0.1 vol%).
+
+    What is kept is what is packed: spheres of the size of their class.
+
+    Parameters
+    ----------
+    csd : CrystalSizeDistribution
+        The full distribution.
+    smallest_share : float
+        Volume share, of the full distribution, under which a class is dropped.
+    smallest, largest : float
+        Diameters, m, under and over which a class is dropped.
 
     Raises
     ------
     CsdError
         If nothing would be left.
     """
-    keep = csd.volume_fraction >= smallest_share
+    inside = (csd.size >= smallest * (1.0 - SAME_SIZE)) & (csd.size <= largest * (1.0 + SAME_SIZE))
+    keep = inside & (csd.volume_fraction >= smallest_share)
     if not keep.any():
-        raise CsdError(
-            f"truncation at {smallest_share:g} per class leaves no class: the largest class holds "
-            f"{csd.volume_fraction.max():.3g}; lower the truncation below that"
-        )
+        raise CsdError(_nothing_left(csd, inside, smallest_share, smallest, largest))
     kept = float(csd.volume_fraction[keep].sum())
     fractions = csd.volume_fraction[keep] / kept
     return Truncation(CrystalSizeDistribution(csd.size[keep], fractions), kept)
 
 
+def _nothing_left(
+    csd: CrystalSizeDistribution,
+    inside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    share: float,
+    smallest: float,
+    largest: float,
+) -> str:
+    sizes = f"between {smallest / MICROMETRE:g} and {largest / MICROMETRE:g} um"
+    if not inside.any():
+        return (
+            f"truncation leaves no class: none is {sizes}; "
+            f"the sizes run from {csd.smallest / MICROMETRE:g} to {csd.largest / MICROMETRE:g} um"
+        )
+    where = "" if inside.all() else f" {sizes}"
+    return (
+        f"truncation at {share:g} per class leaves no class: the largest class{where} holds "
+        f"{csd.volume_fraction[inside].max():.3g}; lower the truncation below that"
+    )
+
+
 def discretise(
-    cumulative_volume: Callable[[FloatArray], FloatArray], upper: float, bin_width: float
+    cumulative_volume: Callable[[FloatArray], FloatArray],
+    upper: float,
+    bin_width: float,
+    cumulative_sums: Callable[[FloatArray], tuple[FloatArray, FloatArray]] | None = None,
 ) -> CrystalSizeDistribution:
     """Cut a continuous distribution into bins of about ``bin_width``, each class at its bin's centre.
 
@@ -165,6 +213,9 @@ def discretise(
         Largest diameter considered, m.
     bin_width : float
         Wanted bin width, m; the width used divides ``upper`` into a whole number of bins (rounded down).
+    cumulative_sums : callable or None
+        The sums of x/d (1/m) and x/d^2 (1/m2) up to given diameters, shape (n,) each: with them the classes add exactly
+        what the continuous distribution has, without them that of crystals at the bins' centres.
 
     Raises
     ------
@@ -178,7 +229,12 @@ def discretise(
     volume = np.diff(cumulative_volume(edges))
     if not volume.sum() > 0.0:
         raise CsdError(f"the distribution has no volume below {upper:g} m")
-    return CrystalSizeDistribution.from_classes(0.5 * (edges[1:] + edges[:-1]), volume / volume.sum())
+    fractions = volume / volume.sum()
+    csd = CrystalSizeDistribution.from_classes(0.5 * (edges[1:] + edges[:-1]), fractions)
+    if cumulative_sums is None:
+        return csd
+    over_d, over_d2 = (np.diff(sums)[fractions > 0.0] for sums in cumulative_sums(edges))
+    return replace(csd, x_over_d=over_d, x_over_d2=over_d2)
 
 
 def read_csd(path: Path) -> CrystalSizeDistribution:
@@ -223,7 +279,7 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
     Returns
     -------
     DataFrame
-        Columns size_um, volume_fraction, number_fraction, truncated_volume_fraction,
+        Columns size_um, volume_fraction, number_fraction, x_over_d_1_m, x_over_d2_1_m2, truncated_volume_fraction,
         truncated_number_fraction; one row per class of the full distribution.
     """
     inside = np.isin(full.size, truncated.size)
@@ -234,13 +290,15 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
             "size_um": full.size / MICROMETRE,
             "volume_fraction": full.volume_fraction,
             "number_fraction": full.number_fraction,
+            "x_over_d_1_m": full.volume_fraction / full.size if full.x_over_d is None else full.x_over_d,
+            "x_over_d2_1_m2": full.volume_fraction / full.size**2 if full.x_over_d2 is None else full.x_over_d2,
             "truncated_volume_fraction": volume,
             "truncated_number_fraction": number,
         }
     )
 
 
-def from_table(table: pd.DataFrame) -> tuple[CrystalSizeDistribution, CrystalSizeDistribution]:
+def from_table(table: pd.DataFrame) -> FullAndTruncated:
     """Read back the full and the truncated distribution from :func:`to_table`'s columns.
 
     Raises
@@ -248,11 +306,14 @@ def from_table(table: pd.DataFrame) -> tuple[CrystalSizeDistribution, CrystalSiz
     CsdError
         If a column is missing or the classes are not a distribution.
     """
-    missing = {"size_um", "volume_fraction", "truncated_volume_fraction"} - set(table.columns)
+    needed = {"size_um", "volume_fraction", "x_over_d_1_m", "x_over_d2_1_m2", "truncated_volume_fraction"}
+    missing = needed - set(table.columns)
     if missing:
         raise CsdError(f"the table of a size distribution lacks the columns {', '.join(sorted(missing))}")
     size = table["size_um"].to_numpy(np.float64) * MICROMETRE
     full = CrystalSizeDistribution.from_classes(size, table["volume_fraction"].to_numpy(np.float64))
+    over_d, over_d2 = (table[name].to_numpy(np.float64) for name in ("x_over_d_1_m", "x_over_d2_1_m2"))
+    full = replace(full, x_over_d=over_d, x_over_d2=over_d2)
     truncated = CrystalSizeDistribution.from_classes(size, table["truncated_volume_fraction"].to_numpy(np.float64))
     return full, truncated
 

@@ -68,6 +68,10 @@ def study_template() -> str:
         "    # file: ../csd/example.csv",
         f"    # {_text(Csd.model_fields['truncate_below_volume_fraction'])}",
         "    # truncate_below_volume_fraction: 0.001",
+        f"    # {_text(Csd.model_fields['truncate_below_um'])}",
+        "    # truncate_below_um: 25",
+        f"    # {_text(Csd.model_fields['truncate_above_um'])}",
+        "    # truncate_above_um: 500",
     ]
     for part, optional in (("crystallizer", Crystallizer), ("filter", Filter)):
         lines += ["", f"# {_text(Study.model_fields[part])}", f"# {part}:"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import pandas as pd
 from filtercake import contact
 from filtercake.config import SWEPT, Packing, Study, Sweep
 from filtercake.config_loading import LoadedStudy
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.errors import PackingRejected
 from filtercake.packing.cloud import BedSize, bed_for
 from filtercake.packing.pack import MANIFEST, Outcome
@@ -25,9 +25,15 @@ from filtercake.packing.spec import PackingSpec, digest
 from filtercake.porosity import measure
 from filtercake.precision import half_width
 from filtercake.resistance import carman_sauter, kozeny_carman
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE, tidy
 
-MEASURED = ("porosity", "porosity_as_published", "resistance_m_kg", "resistance_sauter_m_kg")
+MEASURED = (
+    "porosity",
+    "porosity_as_published",
+    "resistance_m_kg",
+    "resistance_sauter_m_kg",
+    "resistance_truncated_m_kg",
+)
 
 POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", *SWEPT, "engine", "porosity_interval_asked")
 REPLICATE_COLUMNS = (
@@ -61,6 +67,7 @@ SUMMARY_COLUMNS = (
     "resistance_ci95_m_kg",
     "resistance_sauter_m_kg",
     "resistance_sauter_ci95_m_kg",
+    "resistance_truncated_m_kg",
     "soft_contact_compaction",
     "overlap_max",
     "wall_s",
@@ -119,11 +126,11 @@ class Point:
             "study": self.study,
             "csd": self.csd,
             "residence_time_min": np.nan if self.residence_time_min is None else self.residence_time_min,
-            "cohesion_kJ_m3": _tidy(self.spec.cohesion / KILOJOULE_PER_M3),
+            "cohesion_kJ_m3": tidy(self.spec.cohesion / KILOJOULE_PER_M3),
             "friction": self.spec.friction,
             "poisson_ratio": self.spec.poisson_ratio,
             "restitution": self.spec.restitution,
-            "youngs_modulus_MPa": _tidy(self.spec.youngs_modulus / MEGAPASCAL),
+            "youngs_modulus_MPa": tidy(self.spec.youngs_modulus / MEGAPASCAL),
             "engine": self.spec.engine,
             "porosity_interval_asked": np.nan if self.porosity_interval is None else self.porosity_interval,
         }
@@ -184,9 +191,7 @@ def points_table(points: Iterable[Point]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*POINT_COLUMNS, "replicates"])
 
 
-def replicate_row(
-    point: Point, packing: SettledPacking, csd: CrystalSizeDistribution, sphericity: float
-) -> dict[str, Any]:
+def replicate_row(point: Point, packing: SettledPacking, csd: FullAndTruncated, sphericity: float) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
     Parameters
@@ -195,13 +200,13 @@ def replicate_row(
         Where it belongs.
     packing : Packing
         The packing.
-    csd : CrystalSizeDistribution
-        The full distribution: the resistance needs all of it.
+    csd : (CrystalSizeDistribution, CrystalSizeDistribution)
+        The full distribution, which the resistance needs all of, and the truncated one, for comparison.
     sphericity : float
         For the resistance law.
     """
     found, record = measure(packing, point.spec), packing.diagnostics
-    law = (csd, point.spec.density, sphericity)
+    (full, truncated), law = csd, (point.spec.density, sphericity)
     return {
         **point.row(),
         "replicate": record["replicate"],
@@ -211,8 +216,9 @@ def replicate_row(
         "settled": record["settled"],
         "porosity": found.interior,
         "porosity_as_published": found.as_published,
-        "resistance_m_kg": kozeny_carman(found.interior, *law),
-        "resistance_sauter_m_kg": carman_sauter(found.interior, *law),
+        "resistance_m_kg": kozeny_carman(found.interior, full, *law),
+        "resistance_sauter_m_kg": carman_sauter(found.interior, full, *law),
+        "resistance_truncated_m_kg": kozeny_carman(found.interior, truncated, *law),
         "porosity_from_floor": found.from_floor,
         "soft_contact_compaction": found.compaction,
         "overlap_max": record["overlap_max"],
@@ -232,7 +238,7 @@ def failed_row(point: Point, outcome: Outcome, reason: str) -> dict[str, Any]:
 
 
 def replicates_table(
-    points: Iterable[Point], packings: Path, csds: dict[str, CrystalSizeDistribution], sphericity: float
+    points: Iterable[Point], packings: Path, csds: Mapping[str, FullAndTruncated], sphericity: float
 ) -> pd.DataFrame:
     """Measure every packing of a study, ``REPLICATE_COLUMNS``; a failed or damaged one is a row with a reason.
 
@@ -242,8 +248,8 @@ def replicates_table(
         The study's points.
     packings : Path
         Folder with one folder per point.
-    csds : dict of str to CrystalSizeDistribution
-        The full distributions by name.
+    csds : mapping of str to (CrystalSizeDistribution, CrystalSizeDistribution)
+        The full and truncated distributions by name.
     sphericity : float
         For the resistance law.
     """
@@ -376,8 +382,3 @@ def _slug(csd_name: str, swept: dict[str, float], study: Study, spec: PackingSpe
     decisive = {key: value for key, value in asdict(spec).items() if key not in idle}
     code = digest(decisive, csd.size.tolist(), csd.volume_fraction.tolist())[:8]
     return re.sub(r"[^A-Za-z0-9_.-]", "-", "_".join([*parts, code]))
-
-
-def _tidy(value: float) -> float:
-    """Undo the last bit lost in a change of unit, so that 50 kJ/m3 is written 50.0."""
-    return float(f"{value:.12g}")

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from filtercake.config import Published, Study
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.crystallizer import SteadyState
+from filtercake.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.drum_filter import Cake, DrumFilter, area, design_table
-from filtercake.errors import FilterError
+from filtercake.errors import CrystallizerError, FilterError
 from filtercake.packing.cloud import box_length
 from filtercake.resistance import kozeny_carman
 from filtercake.study import base_rows, bed_of
-from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
+from filtercake.units import HOUR, KILOPASCAL, LITRE, MICROMETRE, MILLIPASCAL_SECOND, MINUTE, tidy
 
-Csds = dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
+Csds = dict[str, FullAndTruncated]
 
 COMPARISON_COLUMNS = (
     "csd",
@@ -30,6 +32,20 @@ COMPARISON_COLUMNS = (
     "sd",
     "deviation_sd",
     "porosity",
+)
+
+
+CRYSTALLIZER_COLUMNS = (
+    "csd",
+    "kinetics",
+    "residence_time_min",
+    "crystallizer_volume_m3",
+    "slurry_density_kg_m3",
+    "growth_rate_m_s",
+    "nucleation_rate_1_L_s",
+    "size_scale_um",
+    "mass_mean_size_um",
+    "kept_volume_fraction",
 )
 
 
@@ -69,7 +85,7 @@ def table1(study: Study, csds: Csds) -> pd.DataFrame:
 
 
 def table2(study: Study, csds: Csds) -> pd.DataFrame:
-    """Tabulate what each distribution keeps when its rare classes are left out of the packing (paper, Table 2)."""
+    """Tabulate what each distribution keeps when classes are left out of the packing (paper, Table 2)."""
     rows = []
     for name, (full, truncated) in csds.items():
         kept = np.isin(full.size, truncated.size)
@@ -79,15 +95,65 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
                 "label": study.csds[name].label or name,
                 "residence_time_min": study.csds[name].residence_time_min,
                 "truncate_below_volume_fraction": study.csds[name].truncate_below_volume_fraction,
+                "truncate_below_um": study.csds[name].truncate_below_um,
+                "truncate_above_um": study.csds[name].truncate_above_um,
                 "classes": truncated.size.size,
                 "smallest_um": round(truncated.smallest / MICROMETRE, 2),
                 "largest_um": round(truncated.largest / MICROMETRE, 2),
-                "kept_volume_fraction": round(float(full.volume_fraction[kept].sum()), 5),
+                "kept_volume_fraction": _kept(full, truncated),
+                "discarded_volume_fraction": round(float(full.volume_fraction[~kept].sum()), 5),
                 "published_smallest_um": _value(published_value(study, name, "smallest_um", "simulation")),
                 "published_largest_um": _value(published_value(study, name, "largest_um", "simulation")),
             }
         )
     return pd.DataFrame(rows)
+
+
+def crystallizer_table(study: Study, states: Mapping[str, SteadyState], csds: Csds) -> pd.DataFrame:
+    """Tabulate the crystallizer at every residence time, shortest first (paper, Figs 12 and 13).
+
+    Parameters
+    ----------
+    study : Study
+        Has the slurry flow that makes a volume of a residence time.
+    states : mapping of str to SteadyState
+        The crystallizer behind each of its products.
+    csds : dict of str to (CrystalSizeDistribution, CrystalSizeDistribution)
+        All distributions, full and truncated.
+
+    Returns
+    -------
+    DataFrame
+        :data:`CRYSTALLIZER_COLUMNS`; the mean size is weighted by mass.
+
+    Raises
+    ------
+    CrystallizerError
+        If the study has no crystallizer.
+    """
+    if study.crystallizer is None:
+        raise CrystallizerError("the study has no crystallizer: add the section crystallizer")
+    flow = study.crystallizer.slurry_flow_m3_h / HOUR
+    rows = [
+        {
+            "csd": name,
+            "kinetics": state.kinetics,
+            "residence_time_min": tidy(state.residence_time / MINUTE),
+            "crystallizer_volume_m3": tidy(flow * state.residence_time),
+            "slurry_density_kg_m3": state.slurry_density,
+            "growth_rate_m_s": state.growth_rate,
+            "nucleation_rate_1_L_s": state.nucleation_rate * LITRE,
+            "size_scale_um": state.size_scale / MICROMETRE,
+            "mass_mean_size_um": state.volume_mean / MICROMETRE,
+            "kept_volume_fraction": _kept(*csds[name]),
+        }
+        for name, state in sorted(states.items(), key=lambda item: item[1].residence_time)
+    ]
+    return pd.DataFrame(rows, columns=list(CRYSTALLIZER_COLUMNS))
+
+
+def _kept(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> float:
+    return round(float(full.volume_fraction[np.isin(full.size, truncated.size)].sum()), 5)
 
 
 def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
@@ -219,12 +285,13 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
 
     ``sd`` is the standard deviation of one packing, pooled over the study's points of the same engine: a few
     replicates of one point say little about it. ``deviation_sd`` is the published value's distance from our mean
-    in these: a published value is one packing (or a few), so that within three of them it is no different.
+    in these: a published value is one packing (or a few), so that within three of them it is no different. Both are
+    blank where no point of the engine has two packings.
     """
     good = replicates[replicates["status"] == "ok"]
     spread = good.groupby(["engine", "point"])["porosity_as_published"].agg(["var", "count"]).dropna()
     weight = spread["count"] - 1
-    pooled = np.sqrt((spread["var"] * weight).groupby("engine").sum() / weight.groupby("engine").sum())
+    pooled = ((spread["var"] * weight).groupby("engine").sum() / weight.groupby("engine").sum()) ** 0.5
     rows = []
     for entry in study.published:
         if entry.quantity != "porosity" or entry.cohesion_kJ_m3 is None or entry.friction is None:
@@ -235,12 +302,13 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
         for name in ("poisson_ratio", "restitution", "youngs_modulus_MPa"):
             here &= np.isclose(replicates[name], getattr(study.material, name))
         values = replicates.loc[here, "porosity_as_published"].to_numpy(np.float64)
-        if values.size < 2:
+        if not values.size:
             continue
-        mean, sd = float(values.mean()), float(pooled[replicates.loc[here, "engine"].iloc[0]])
+        engine = str(replicates.loc[here, "engine"].iloc[0])
+        mean, sd = float(values.mean()), float(pooled.get(engine, np.nan))
         rows.append(
             (
-                *(entry.csd, entry.cohesion_kJ_m3, entry.friction, replicates.loc[here, "engine"].iloc[0]),
+                *(entry.csd, entry.cohesion_kJ_m3, entry.friction, engine),
                 *(entry.source, entry.value, values.size, mean, sd, (entry.value - mean) / sd),
                 float(replicates.loc[here, "porosity"].mean()),
             )

@@ -15,6 +15,7 @@ MICROMETRE: Final = 1e-6
 MICROSECOND: Final = 1e-6
 MINUTE: Final = 60.0
 HOUR: Final = 3600.0
+LITRE: Final = 1e-3
 KILOJOULE_PER_M3: Final = 1e3
 MEGAPASCAL: Final = 1e6
 KILOPASCAL: Final = 1e3
@@ -34,6 +35,11 @@ LENGTH_UNITS: Final[dict[str, float]] = {
 FRACTION_UNITS: Final[dict[str, float]] = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01, "percent": 0.01}
 
 _HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<bracket>[^\])]*)\s*[\])])?\s*$")
+
+
+def tidy(value: float) -> float:
+    """Undo the last bit lost in a change of unit, so that 50 kJ/m3 is written 50.0."""
+    return float(f"{value:.12g}")
 
 
 def split_header(header: str) -> tuple[str, str | None]:

@@ -21,7 +21,7 @@ from filtercake.figures.catalogue import StudyData, draw, figures_of, save
 from filtercake.figures.truncation import class_edges
 from filtercake.resistance import carman_sauter, kozeny_carman
 from filtercake.study import REPLICATE_COLUMNS, expand, points_table, summarise
-from filtercake.tables import drum_of, filter_design
+from filtercake.tables import crystallizer_table, drum_of, filter_design
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -56,7 +56,17 @@ def make(study: LoadedStudy, porosities: dict[str, list[float | None]] | None = 
     replicates = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
     csds = {name: (loaded.full, loaded.truncated) for name, loaded in study.csds.items()}
     shown = study.model.model_copy(update=model)
-    return StudyData("alum", shown, points_table(points), summarise(replicates), replicates, csds, Path("none"))
+    states = {name: loaded.crystallizer for name, loaded in study.csds.items() if loaded.crystallizer}
+    return StudyData(
+        name="alum",
+        study=shown,
+        points=points_table(points),
+        summary=summarise(replicates),
+        replicates=replicates,
+        csds=csds,
+        packings=Path("none"),
+        crystallizer=crystallizer_table(study.model, states, csds),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -171,13 +181,6 @@ class TestEveryFigure:
         other = data.summary.assign(friction=0.3)
         draw(name, dataclasses.replace(data, summary=other)).canvas.draw()
 
-    def test_draws_with_kinetics_from_a_file(self, name: str, data: StudyData) -> None:
-        own = data.study.crystallizer.model_copy(update={"kinetics": "mine", "kinetics_file": "mine.yaml"})  # type: ignore[union-attr]
-        figure = draw(name, dataclasses.replace(data, study=data.study.model_copy(update={"crystallizer": own})))
-        figure.canvas.draw()
-        if name in ("fig12_distributions", "fig13_growth_nucleation"):
-            assert "the study's own file" in texts(figure)
-
 
 class TestTruncation:
     def test_classes_are_kept_or_discarded(self, data: StudyData) -> None:
@@ -199,6 +202,16 @@ class TestTruncation:
         first = draw("fig05_truncation", data).axes[0]
         assert "98.2 %" in first.texts[0].get_text() and "32.5 to 543.3 µm" in first.texts[0].get_text()
         assert [line.get_xdata()[0] for line in marked(first, "published")] == [32.5, 543.3]
+
+    def test_limits_of_size_are_drawn(self, data: StudyData) -> None:
+        limits = {"truncate_below_volume_fraction": 0.0, "truncate_below_um": 40.0, "truncate_above_um": 500.0}
+        model = data.study.csds["tau_15min"].model_copy(update=limits)
+        study = data.study.model_copy(update={"csds": {**data.study.csds, "tau_15min": model}})
+        first, second, *_ = draw("fig05_truncation", dataclasses.replace(data, study=study)).axes
+        assert [line.get_xdata()[0] for line in marked(first, "limit")] == [40.0, 500.0]
+        assert not marked(first, "threshold") and not marked(second, "limit")
+        alone = study.model_copy(update={"csds": {"tau_15min": model}})
+        assert "fig05_truncation" in figures_of([], alone)
 
     def test_at_most_four_panels(self, data: StudyData) -> None:
         model = data.study.model_copy(update={"csds": {**data.study.csds, "fifth": data.study.csds["tau_60min"]}})
@@ -225,15 +238,6 @@ class TestDistributions:
             means = [line.get_xdata()[0] for line in marked(axes, gid)]
             assert means == pytest.approx([order * scale for scale in SIZE_SCALES], rel=1e-4)
 
-    def test_classes_of_other_kinetics_are_as_dense(self, data: StudyData) -> None:
-        own = data.study.crystallizer.model_copy(update={"kinetics_file": "mine.yaml"})  # type: ignore[union-attr]
-        model = data.study.model_copy(update={"crystallizer": own})
-        (axes,) = draw("fig12_distributions", dataclasses.replace(data, study=model)).axes
-        for line, scale in zip(marked(axes, "density"), SIZE_SCALES, strict=True):
-            size, density = line.get_data()
-            expected = 100.0 * size**3 * np.exp(-size / scale) / (6.0 * scale**4)
-            assert density == pytest.approx(expected, abs=0.002)
-
 
 class TestGrowthAndNucleation:
     def test_markers_are_the_table_of_the_kinetics(self, data: StudyData) -> None:
@@ -249,6 +253,40 @@ class TestGrowthAndNucleation:
             volume, rate = (np.asarray(values) for values in marked(axes, "curve")[0].get_data())
             assert len(volume) > 50 and (volume[0], volume[-1]) == pytest.approx((5.0, 20.0))
             assert rate / rate[0] == pytest.approx((volume / volume[0]) ** exponent)
+
+    def test_kinetics_of_the_user_s_own_are_drawn(self, tmp_path: Path) -> None:
+        """Of i = 1: G as tau^(-4/4), B0 as G; G and B0 from eqs. 13, 14 and 16 by hand."""
+        entry = "{nucleation_coefficient: 1.0e+13, units: 'B0 #/(m3 s), MT kg/m3, G m/s', slurry_density_exponent: 1, "
+        entry += "growth_rate_exponent: 1, shape_factor: 0.5, density_kg_m3: 2000, source: me}"
+        (tmp_path / "own.yaml").write_text(f"salt: {entry}\n")
+        text = (STUDIES / "alum.yaml").read_text(encoding="utf-8")
+        text = text.replace("  kinetics: ammonium_alum\n", "  kinetics: salt\n  kinetics_file: own.yaml\n")
+        (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+        own = make(load_study(tmp_path / "mine.yaml"))
+        time = 60.0 * np.array([15, 30, 45, 60])
+        rate = (6.0 * 0.5 * 2000.0 * 1e13 * time**4) ** -0.25
+        for axes, expected in zip(
+            draw("fig13_growth_nucleation", own).axes, (rate, 1e13 * 200 * rate * 1e-3), strict=True
+        ):
+            assert marked(axes, "study")[0].get_ydata() == pytest.approx(expected)
+            volume, drawn = (np.asarray(values) for values in marked(axes, "curve")[0].get_data())
+            assert drawn / drawn[0] == pytest.approx(volume[0] / volume)
+        (axes,) = draw("fig12_distributions", own).axes
+        means = [line.get_xdata()[0] for line in marked(axes, "volume")]
+        assert means == pytest.approx(4e6 * rate * time)
+        for name in NAMES:
+            draw(name, own).canvas.draw()
+
+    def test_one_residence_time_is_a_marker(self, data: StudyData) -> None:
+        one = dataclasses.replace(data, crystallizer=data.crystallizer.iloc[:1])
+        for axes in draw("fig13_growth_nucleation", one).axes:
+            assert len(marked(axes, "study")[0].get_xdata()) == 1
+
+    def test_no_product_is_said(self, data: StudyData) -> None:
+        for crystallizer in (data.crystallizer.iloc[:0], pd.DataFrame()):
+            for name in ("fig12_distributions", "fig13_growth_nucleation"):
+                figure = draw(name, dataclasses.replace(data, crystallizer=crystallizer))
+                assert "no distribution is made by a crystallizer" in texts(figure)
 
     def test_units(self, data: StudyData) -> None:
         upper, lower = draw("fig13_growth_nucleation", data).axes

@@ -89,3 +89,23 @@ def test_unknown_calibrations_are_listed(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as error:
         load_calibrations(["pmmma", "pmma"], ROOT / "config/calibrations", STUDIES, "config/config.yaml")
     assert "calibrations[0] = 'pmmma': no such calibration; allowed: pmma, pmma_paper, synthetic" in str(error.value)
+
+
+def test_calibrations_of_one_name_are_refused(tmp_path: Path) -> None:
+    paths = [tmp_path / folder / "mine.yaml" for folder in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        load(path.parent)
+    with pytest.raises(ConfigError) as error:
+        load_calibrations(map(str, paths), tmp_path, STUDIES, "config/config.yaml")
+    (problem,) = error.value.problems
+    assert problem.key == "calibrations[1]"
+    assert f"{paths[0]} and {paths[1]} would both be called calibration_mine" in problem.allowed
+
+
+def test_the_name_of_a_calibration_s_file_must_be_allowed(tmp_path: Path) -> None:
+    path = tmp_path / "my file.yaml"
+    path.write_text(TINY)
+    with pytest.raises(ConfigError) as error:
+        load_calibrations([str(path)], tmp_path, STUDIES, "config/config.yaml")
+    assert "'" + str(path) + "': the file's name must be letters, digits" in str(error.value)

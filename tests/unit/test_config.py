@@ -698,7 +698,12 @@ def test_other_kinetics_are_one_word(tmp_path: Path) -> None:
         ("kg_m3: 200", "kg_m3: -1", "crystallizer.slurry_density_kg_m3", "greater than 0"),
         ("[15, 7.5]", "[0]", "sweeps[0].residence_time_min[0]", "greater than 0"),
         ("- residence", "- csd: a\n    residence", "sweeps[0]", "exactly one of csd and residence_time_min"),
-        ("  kinetics: ammonium_alum", "  kinetics: x\n  kinetics_file: no.yaml", "crystallizer.kinetics", "no.yaml"),
+        (
+            "  kinetics: ammonium_alum",
+            "  kinetics: x\n  kinetics_file: no.yaml",
+            "crystallizer.kinetics_file",
+            "no.yaml",
+        ),
     ],
 )
 def test_a_wrong_crystallizer_is_named(tmp_path: Path, before: str, after: str, key: str, says: str) -> None:

@@ -227,6 +227,30 @@ def test_truncation_that_leaves_nothing_is_refused() -> None:
         truncate(mixture([10 * UM, 20 * UM], [0.5, 0.5]), 0.51)
 
 
+def test_truncation_by_size_keeps_both_ends() -> None:
+    csd = mixture([10 * UM, 20 * UM, 30 * UM, 40 * UM], [0.1, 0.2, 0.3, 0.4])
+    cut = truncate(csd, smallest=0.02e-3, largest=30 * UM)  # 0.02 mm is the 20 um
+    assert cut.csd.size / UM == pytest.approx([20, 30])
+    assert cut.csd.volume_fraction == pytest.approx([0.4, 0.6])
+    assert cut.kept_volume == pytest.approx(0.5)
+    assert truncate(csd, 0.25, largest=30 * UM).csd.size / UM == pytest.approx([30])  # shares are of the whole
+    assert (truncate(csd).csd.volume_fraction == csd.volume_fraction).all()
+
+
+@pytest.mark.parametrize(
+    ("limits", "says"),
+    [
+        ({"smallest": 41 * UM}, r"none is between 41 and inf um; the sizes run from 10 to 40 um"),
+        ({"largest": 9 * UM}, r"none is between 0 and 9 um"),
+        ({"smallest": 12 * UM, "largest": 19 * UM}, r"none is between 12 and 19 um"),
+        ({"smallest_share": 0.3, "largest": 20 * UM}, r"the largest class between 0 and 20 um holds 0\.2;"),
+    ],
+)
+def test_truncation_by_size_that_leaves_nothing_is_refused(limits: dict[str, float], says: str) -> None:
+    with pytest.raises(CsdError, match=says):
+        truncate(mixture([10 * UM, 20 * UM, 40 * UM], [0.1, 0.2, 0.7]), **limits)
+
+
 @given(distributions(), st.floats(0.0, 0.3))
 def test_truncation_keeps_what_it_says(csd: CrystalSizeDistribution, share: float) -> None:
     if csd.volume_fraction.max() < share:
@@ -251,6 +275,19 @@ def test_table_round_trip(csd: CrystalSizeDistribution, share: float) -> None:
         assert after.volume_fraction == pytest.approx(before.volume_fraction, rel=1e-12)
 
 
+def test_a_table_keeps_what_the_classes_add_to_the_sums(tmp_path: Path) -> None:
+    # between 0 and 10 um, uniform in volume: sum x/d diverges at 0, so that these sums are made up
+    sums = (lambda size: 3e5 * size / (10 * UM), lambda size: 4e10 * (size / (10 * UM)) ** 2)
+    csd = discretise(lambda size: size / (10 * UM), 10 * UM, 2.5 * UM, lambda size: (sums[0](size), sums[1](size)))
+    assert (csd.sum_x_over_d, csd.sum_x_over_d2) == pytest.approx((3e5, 4e10), rel=1e-14)
+    to_table(csd, truncate(csd, largest=8 * UM).csd).to_csv(tmp_path / "csd.csv", index=False)
+    full, truncated = from_table(pd.read_csv(tmp_path / "csd.csv"))
+    assert full.x_over_d2 == pytest.approx(csd.x_over_d2)
+    assert (full.sum_x_over_d, full.sum_x_over_d2) == pytest.approx((3e5, 4e10), rel=1e-14)
+    assert truncated.x_over_d is None
+    assert truncated.sum_x_over_d == pytest.approx(float(np.sum(1.0 / 3.0 / truncated.size)), rel=1e-12)
+
+
 def test_table_lists_left_out_classes_with_zero() -> None:
     full = mixture([10 * UM, 20 * UM], [0.01, 0.99])
     table = to_table(full, truncate(full, 0.1).csd)
@@ -258,6 +295,8 @@ def test_table_lists_left_out_classes_with_zero() -> None:
     assert table["truncated_volume_fraction"].tolist() == [0.0, 1.0]
     assert table["truncated_number_fraction"].tolist() == [0.0, 1.0]
     assert table["number_fraction"].sum() == pytest.approx(1.0, abs=1e-15)
+    assert table["x_over_d_1_m"].sum() == pytest.approx(full.sum_x_over_d, rel=1e-14)
+    assert table["x_over_d2_1_m2"].sum() == pytest.approx(full.sum_x_over_d2, rel=1e-14)
 
 
 def test_the_same_table_on_disk_is_the_same_distribution(tmp_path: Path, alum) -> None:

@@ -292,7 +292,12 @@ def row(point: str, replicate: int, porosity: float = 0.36, status: str = "ok", 
     values: dict[str, Any] = {"point": point, "study": "s", "csd": "a", "replicate": replicate, "status": status}
     if status == "ok":
         values.update(porosity=porosity, porosity_as_published=porosity + 0.01, resistance_m_kg=1e9 * porosity)
-        values.update(resistance_sauter_m_kg=9e8 * porosity, wall_s=2.0, overlap_max=0.001 * (replicate + 1))
+        values.update(
+            resistance_sauter_m_kg=9e8 * porosity,
+            resistance_truncated_m_kg=8e8 * porosity,
+            wall_s=2.0,
+            overlap_max=0.001 * (replicate + 1),
+        )
     return {**values, **more}
 
 
@@ -310,6 +315,7 @@ def test_a_summary_by_hand() -> None:
     assert line["porosity_as_published"] == pytest.approx(0.37)
     assert line["resistance_m_kg"] == pytest.approx(3.6e8)
     assert line["resistance_ci95_m_kg"] == pytest.approx(4.302653 * 1e7 / np.sqrt(3), rel=1e-6)
+    assert line["resistance_truncated_m_kg"] == pytest.approx(8e8 * 0.36)
     assert line["overlap_max"] == pytest.approx(0.003)
 
 
@@ -344,6 +350,7 @@ def test_no_packing_at_all_is_an_empty_summary() -> None:
 def test_replicates_are_measured_and_damaged_ones_are_rows_with_a_reason(points_of, tmp_path: Path) -> None:
     (point,) = points_of("  - {csd: a, replicates: 3}\n")
     csd = mixture([20 * UM, 50 * UM], [0.5, 0.5])
+    packed = mixture([50 * UM], [1.0])
     folder = tmp_path / point.name
     grid = np.stack(np.meshgrid(*(np.arange(n) for n in (4, 4, 8)), indexing="ij"), axis=-1).reshape(-1, 3)
     position, radius = (grid + 0.5) * 40 * UM, np.full(128, 20 * UM)
@@ -357,7 +364,7 @@ def test_replicates_are_measured_and_damaged_ones_are_rows_with_a_reason(points_
     write_json(folder / MANIFEST, {"key": "k", "replicates": [dataclasses.asdict(outcome) for outcome in outcomes]})
     (folder / "r1.npz").write_bytes((folder / "r1.npz").read_bytes()[:-10])
 
-    found = replicates_table([point], tmp_path, {"a": csd}, sphericity=0.9)
+    found = replicates_table([point], tmp_path, {"a": (csd, packed)}, sphericity=0.9)
     assert tuple(found.columns) == REPLICATE_COLUMNS
     assert found["replicate"].tolist() == [0, 1, 2]
     assert found["status"].tolist() == ["ok", "failed", "failed"]
@@ -369,6 +376,7 @@ def test_replicates_are_measured_and_damaged_ones_are_rows_with_a_reason(points_
     assert good["porosity"] == pytest.approx(cubic, abs=1e-12)
     assert good["resistance_m_kg"] == pytest.approx(kozeny_carman(cubic, csd, 1180.0, 0.9), rel=1e-10)
     assert good["resistance_sauter_m_kg"] == pytest.approx(carman_sauter(cubic, csd, 1180.0, 0.9), rel=1e-10)
+    assert good["resistance_truncated_m_kg"] == pytest.approx(kozeny_carman(cubic, packed, 1180.0, 0.9), rel=1e-10)
     assert (good["length_um"], good["bed_height_um"]) == (pytest.approx(160.0), pytest.approx(320.0))
     assert found.loc[1:, "porosity"].isna().all()
     (line,) = summarise(found).to_dict("records")

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import Checkout
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -20,6 +21,8 @@ REPOSITORY = Path(__file__).resolve().parents[2]
         ("reference", ["gather_references", "replicates", "packing"]),
         ("benchmark", ["time_variants", "choices", "coverage", "benchmark_page"]),
         ("stability", ["stress", "stability_page"]),
+        ("twin", ["repeat_calibrations", "replicates", "packing", "csd"]),
+        ("bed_size", ["compare_sizes", "replicates", "packing", "csd"]),
     ],
 )
 def test_a_benchmark_is_planned(target: str, jobs: list[str], tmp_path: Path) -> None:
@@ -28,6 +31,23 @@ def test_a_benchmark_is_planned(target: str, jobs: list[str], tmp_path: Path) ->
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     assert all(job in done.stdout + done.stderr for job in jobs)
+
+
+def test_a_broken_study_of_bed_sizes_stops_only_their_comparison(checkout: Checkout) -> None:
+    study = checkout.root / "config/studies/alum_full.yaml"
+    study.write_text(study.read_text().replace("replicates: 1", "replicates: none"))
+    done = checkout.snakemake("--dry-run", "bed_size")
+    output = done.stdout + done.stderr
+    assert done.returncode != 0 and "alum_full.yaml: packing.replicates = 'none': must be a number" in output
+    assert "most recent call last" not in output
+    assert checkout.run("--dry-run").returncode == 0
+
+
+def test_calibrate_says_what_to_give(checkout: Checkout) -> None:
+    done = checkout.snakemake("--dry-run", "calibrate")
+    output = done.stdout + done.stderr
+    assert done.returncode != 0 and "most recent call last" not in output
+    assert "no calibration is asked for" in output and "allowed: pmma, pmma_paper, synthetic" in output
 
 
 def test_both_engines_make_the_same_points() -> None:

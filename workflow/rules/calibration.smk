@@ -9,7 +9,7 @@ wildcard_constraints:
 
 rule calibrate:
     input:
-        calibration_outputs(),
+        calibration_outputs,
     localrule: True
 
 

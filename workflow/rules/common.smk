@@ -23,6 +23,7 @@ from filtercake.provenance import packing_sources, sources
 from filtercake.stability import families as stress_families
 from filtercake.study import expand as expand_points, with_engine
 from filtercake.units import MICROMETRE
+from snakemake.exceptions import WorkflowError
 
 ROOT = Path(workflow.basedir)
 CONFIG_FILE = "config/config.yaml"
@@ -119,6 +120,19 @@ def filter_tables(wildcards):
     return [f"{RESULTS}/{wildcards.study}/tables/filter.csv"] if has_one else []
 
 
+def crystallizer_tables(wildcards):
+    """The crystallizer's table, where the study has a crystallizer."""
+    has_one = study_of(wildcards).model.crystallizer is not None
+    folder = f"{RESULTS}/{wildcards.study}/tables"
+    return [f"{folder}/crystallizer.csv"] if has_one else []
+
+
+def crystallizer_states(wildcards):
+    """The crystallizer behind each of its products, as plain values."""
+    csds = study_of(wildcards).csds.items()
+    return {name: vars(csd.crystallizer) for name, csd in csds if csd.crystallizer}
+
+
 def figures_of(study):
     return catalogue.figures_of(KNOWN_POINTS[study].values(), KNOWN[study].model)
 
@@ -127,7 +141,7 @@ def csd_params(wildcards):
     study = study_of(wildcards)
     csd, state = study.model.csds[wildcards.csd], study.csds[wildcards.csd].crystallizer
     classes = [[item.size_um, item.volume_fraction] for item in csd.mixture or []]
-    found = {"classes": classes, "truncation": csd.truncate_below_volume_fraction}
+    found = {"classes": classes, "truncation": csd.truncation}
     if state is not None:
         found["size_scale_um"] = state.size_scale / MICROMETRE
         found["bin_width_um"] = study.model.crystallizer.bin_width_um

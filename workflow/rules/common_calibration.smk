@@ -87,7 +87,13 @@ def calibration_params(wildcards):
     }
 
 
-def calibration_outputs():
+def calibration_outputs(wildcards):
+    if not CALIBRATED:
+        files = (ROOT / "config" / "calibrations").glob("*.yaml")
+        raise WorkflowError(
+            "no calibration is asked for: give --config calibrations=<name> (or calibrations in "
+            f"{CONFIG_FILE}); allowed: {', '.join(sorted(file.stem for file in files))}, or the path of a file"
+        )
     found = []
     for name, calibration in CALIBRATED.items():
         folder = f"{RESULTS}/{name}"

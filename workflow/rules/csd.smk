@@ -1,4 +1,4 @@
-# A study's size distributions: whole, and as they are packed.
+# A study's size distributions: whole, and as they are packed; and the crystallizer behind them.
 
 
 rule csd:
@@ -22,3 +22,27 @@ rule csd:
         "size distribution {wildcards.csd} of {wildcards.study}"
     script:
         "../scripts/csd.py"
+
+
+rule crystallizer:
+    input:
+        csds=csd_tables,
+        library=library("tables"),
+    output:
+        "{results}/{study}/tables/crystallizer.csv",
+    log:
+        "{results}/{study}/logs/crystallizer.log",
+    benchmark:
+        "{results}/{study}/benchmarks/crystallizer.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
+        states=crystallizer_states,
+    message:
+        "crystallizer of {wildcards.study}"
+    script:
+        "../scripts/crystallizer.py"

@@ -7,6 +7,7 @@ rule figure:
         summary="{results}/{study}/summary.csv",
         replicates="{results}/{study}/replicates.csv",
         csds=csd_tables,
+        crystallizer=crystallizer_tables,
         library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
     output:
         png=report(

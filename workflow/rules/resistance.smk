@@ -124,6 +124,7 @@ rule filter_design:
 rule provenance:
     input:
         filter_tables,
+        crystallizer_tables,
         "{results}/{study}/points.csv",
         "{results}/{study}/tables/table1.csv",
         summary="{results}/{study}/summary.csv",

@@ -21,5 +21,5 @@ def distribution(file, source):
 
 with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
     full = distribution(list(snakemake.input.file), snakemake.params.source)
-    table = to_table(full, truncate(full, snakemake.params.source["truncation"]).csd)
+    table = to_table(full, truncate(full, **snakemake.params.source["truncation"]).csd)
     table.to_csv(temporary, index=False)

@@ -18,5 +18,6 @@ with job(snakemake.log[0]):
         replicates=pd.read_csv(snakemake.input.replicates),
         csds={Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds},
         packings=Path(snakemake.params.packings),
+        crystallizer=next(map(pd.read_csv, snakemake.input.crystallizer), pd.DataFrame()),
     )
     save(draw(snakemake.wildcards.figure, data), Path(snakemake.output.png), Path(snakemake.output.pdf))

@@ -12,7 +12,7 @@ from filtercake.study import Point, replicates_table
 
 def main(points, packings, csd_tables, sphericity, output):
     """Measure and write the table."""
-    csds = {Path(table).stem: from_table(pd.read_csv(table))[0] for table in csd_tables}
+    csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in csd_tables}
     table = replicates_table(points, packings, csds, sphericity)
     with publish(output) as temporary:
         table.to_csv(temporary, index=False)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,6 +38,8 @@ class StudyData:
         Full and truncated distribution by name.
     packings : Path
         Folder with one folder of packings per point.
+    crystallizer : DataFrame
+        The table of the crystallizer's states (see :func:`filtercake.tables.crystallizer_table`); empty without one.
     """
 
     name: str
@@ -47,6 +49,7 @@ class StudyData:
     replicates: pd.DataFrame
     csds: dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
     packings: Path
+    crystallizer: pd.DataFrame = field(default_factory=pd.DataFrame)
 
 
 def _always(_anything: object) -> bool:
@@ -83,7 +86,7 @@ def _varies(name: str) -> Callable[[list[Point]], bool]:
 
 
 def _truncates(study: Study) -> bool:
-    return any(csd.truncate_below_volume_fraction > 0.0 for csd in study.csds.values())
+    return any(csd.truncation for csd in study.csds.values())
 
 
 def _compares_products(study: Study) -> bool:

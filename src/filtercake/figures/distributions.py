@@ -9,11 +9,9 @@ from matplotlib.figure import Figure
 
 from filtercake.crystallizer import volume_density
 from filtercake.figures import selection, style
-from filtercake.figures.truncation import class_edges
-from filtercake.units import MICROMETRE, FloatArray
+from filtercake.units import MICROMETRE, MINUTE
 
 if TYPE_CHECKING:
-    from filtercake.csd import CrystalSizeDistribution
     from filtercake.figures.catalogue import StudyData
 
 LARGEST_SHOWN = 3.0
@@ -22,27 +20,17 @@ PERCENT_PER_MICROMETRE = 100.0 * MICROMETRE
 
 
 def draw(data: StudyData) -> Figure:
-    """Draw one curve per residence time, continuous where the kinetics are known, and its two mean sizes on it."""
+    """Draw one curve per residence time, and its two mean sizes on it."""
     figure, (axes,) = style.panels(width=style.MEDIUM, height=3.6)
-    products = [(name, time) for name, time in selection.products(data) if name in data.csds]
-    largest = max((data.csds[name][0].mean_size(4, 3) for name, _ in products), default=0.0) * LARGEST_SHOWN
-    classes = False
-    for name, time in products:
+    products = selection.products(data)
+    largest = LARGEST_SHOWN * max((state.volume_mean for _, _, state in products), default=0.0)
+    size = np.linspace(0.0, largest, 401)
+    for name, volume, state in products:
         ink = style.colour(selection.number(data, name))
-        state = selection.steady(data, time)
-        if state is not None:
-            size = np.linspace(0.0, largest, 401)
-            density = volume_density(state, size)
-            means = np.array([state.number_mean, state.volume_mean])
-            heights = volume_density(state, means)
-        else:
-            full = data.csds[name][0]
-            size, density = full.size, _class_density(full)
-            means = np.array([full.mean_size(1, 0), full.mean_size(4, 3)])
-            heights = np.interp(means, size, density)
-            classes = True
-        volume = selection.crystallizer_volume(data, time)
-        label = f"{time:g} min ({volume:g} m³)"
+        density = volume_density(state, size)
+        means = np.array([state.number_mean, state.volume_mean])
+        heights = volume_density(state, means)
+        label = f"{state.residence_time / MINUTE:g} min ({volume:g} m³)"
         axes.plot(size / MICROMETRE, density * PERCENT_PER_MICROMETRE, color=ink, label=label, gid="density")
         for mean, height, fill, gid in zip(means, heights, ("white", ink), ("number", "volume"), strict=True):
             axes.plot(
@@ -68,11 +56,5 @@ def draw(data: StudyData) -> Figure:
     ]
     style.legend(figure, [axes], columns=3, extra=means_keys)
     notes = ["residence time (crystallizer volume)", "full distributions, before truncation; no packing enters"]
-    if classes:
-        notes.append(f"drawn from the size classes: {selection.OWN_KINETICS}")
     style.footer(figure, data.summary.iloc[:0], *notes)
     return figure
-
-
-def _class_density(csd: CrystalSizeDistribution) -> FloatArray:
-    return np.asarray(csd.volume_fraction / np.diff(class_edges(csd.size)))

@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 
 from filtercake.config import Published
-from filtercake.crystallizer import SteadyState, get_kinetics, steady_state
+from filtercake.crystallizer import SteadyState
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
 from filtercake.study import base_rows
-from filtercake.units import HOUR, MINUTE
+from filtercake.units import LITRE, MICROMETRE, MINUTE
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,28 +69,23 @@ def published(data: StudyData, csd: str, quantity: str) -> list[Published]:
     return [value for value in data.study.published if (value.csd, value.quantity) == (csd, quantity)]
 
 
-OWN_KINETICS = "the kinetics are the study's own file, which a figure does not read"
-
-
-def products(data: StudyData) -> list[tuple[str, float]]:
-    """Distributions that the crystallizer makes, with their residence times in min, shortest first."""
-    times = ((name, csd.residence_time_min) for name, csd in data.study.csds.items())
-    return sorted(((name, time) for name, time in times if time is not None), key=lambda item: item[1])
-
-
-def crystallizer_volume(data: StudyData, residence_time_min: float) -> float:
-    """Volume of the study's crystallizer at a residence time, m3; nan where there is none."""
-    crystallizer = data.study.crystallizer
-    return crystallizer.slurry_flow_m3_h * residence_time_min * MINUTE / HOUR if crystallizer else float("nan")
-
-
-def steady(data: StudyData, residence_time_min: float) -> SteadyState | None:
-    """Return the study's crystallizer at a residence time; None without one or with kinetics from a file."""
-    crystallizer = data.study.crystallizer
-    if crystallizer is None or crystallizer.kinetics_file is not None:
-        return None
-    kinetics = get_kinetics(crystallizer.kinetics)
-    return steady_state(kinetics, residence_time_min * MINUTE, crystallizer.slurry_density_kg_m3)
+def products(data: StudyData) -> list[tuple[str, float, SteadyState]]:
+    """Distributions that the crystallizer makes, with its volume (m3) and state, smallest first."""
+    return [
+        (
+            str(row["csd"]),
+            float(row["crystallizer_volume_m3"]),
+            SteadyState(
+                growth_rate=float(row["growth_rate_m_s"]),
+                nucleation_rate=float(row["nucleation_rate_1_L_s"]) / LITRE,
+                size_scale=float(row["size_scale_um"]) * MICROMETRE,
+                residence_time=float(row["residence_time_min"]) * MINUTE,
+                slurry_density=float(row["slurry_density_kg_m3"]),
+                kinetics=str(row["kinetics"]),
+            ),
+        )
+        for _, row in data.crystallizer.iterrows()
+    ]
 
 
 def records(data: StudyData, point: str) -> tuple[list[tuple[int, dict[str, Any]]], str]:

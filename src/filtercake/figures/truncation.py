@@ -1,8 +1,8 @@
-"""Size classes that are packed and classes too rare to be packed, with the threshold between them (paper, Fig. 5)."""
+"""Size classes that are packed and those left out, with the threshold between them (paper, Fig. 5)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +13,7 @@ from filtercake.figures import selection, style
 from filtercake.units import MICROMETRE, FloatArray
 
 if TYPE_CHECKING:
+    from filtercake.config import Csd
     from filtercake.figures.catalogue import StudyData
 
 MOST_PANELS = 4
@@ -22,7 +23,7 @@ KEPT, DISCARDED = style.colour(0), style.colour(1)
 def draw(data: StudyData) -> Figure:
     """Draw one panel per truncated distribution: the share of every class, and what the packing leaves out."""
     csds = data.study.csds
-    names = [name for name in data.csds if name in csds and csds[name].truncate_below_volume_fraction > 0.0]
+    names = [name for name in data.csds if name in csds and csds[name].truncation]
     names.sort(key=lambda name: selection.number(data, name))
     shown = names[:MOST_PANELS]
     columns = min(max(len(shown), 1), 2)
@@ -71,14 +72,7 @@ def _panel(axes: Axes, data: StudyData, name: str) -> list[Line2D]:
     ):
         values = np.where(chosen, share, np.nan)
         axes.stairs(values, edges, fill=True, color=ink, linewidth=0.0, label=label, gid=gid)
-    axes.axhline(
-        threshold * 100.0,
-        color=style.INK,
-        linewidth=0.9,
-        linestyle="--",
-        label=f"threshold: {threshold * 100.0:g} % of the volume",
-        gid="threshold",
-    )
+    _limits(axes, data.study.csds[name])
     axes.set_title(selection.label(data, name), loc="left")
     volume = float(full.volume_fraction[kept].sum())
     lines = [
@@ -100,3 +94,15 @@ def _panel(axes: Axes, data: StudyData, name: str) -> list[Line2D]:
                 )
             )
     return keys
+
+
+def _limits(axes: Axes, csd: Csd) -> None:
+    """Draw the threshold per class and the smallest and largest size, each where it is given."""
+    look: dict[str, Any] = {"color": style.INK, "linewidth": 0.9}
+    share = 100.0 * csd.truncate_below_volume_fraction
+    if share > 0.0:
+        label = f"threshold: {share:g} % of the volume"
+        axes.axhline(share, linestyle="--", label=label, gid="threshold", **look)
+    for size, word in ((csd.truncate_below_um, "smallest"), (csd.truncate_above_um, "largest")):
+        if size is not None:
+            axes.axvline(size, linestyle=":", label=f"{word} size packed: {size:g} µm", gid="limit", **look)
