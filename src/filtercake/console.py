@@ -6,6 +6,8 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+import pandas as pd
+
 from filtercake.job import failure_reason
 from filtercake.packing.pack import MANIFEST
 from filtercake.study import Point
@@ -45,7 +47,20 @@ def success(results: Path, points: Points) -> str:
         if failed:
             lines.append(f"{len(failed)} packings failed (status failed in {folder / 'replicates.csv'}; make retry):")
         lines += [f"  {point} r{replicate}: {reason}" for point, replicate, reason in failed[:SHOWN]]
+        lines += [f"{study}: {line}" for line in _wide_intervals(folder / "summary.csv")]
     return "\n".join(lines)
+
+
+def _wide_intervals(summary: Path) -> Iterator[str]:
+    """Say of each point whose porosity is not known as well as asked how well it is known."""
+    if not summary.exists():
+        return
+    table = pd.read_csv(summary)
+    for row in table[table["interval_reached"] == "no"].to_dict("records"):
+        yield (
+            f"{row['point']}: the porosity's interval is {row['porosity_ci95']:.2g} after {row['n']} packings, not "
+            f"{row['porosity_interval_asked']:g} (packing.porosity_interval); raise packing.max_replicates"
+        )
 
 
 def failure(results: Path, points: Points, since: float) -> str:

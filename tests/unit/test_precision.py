@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from filtercake import console
+from filtercake.config_loading import load_study
 from filtercake.csd import mixture
 from filtercake.packing.pack import MANIFEST, pack_replicates
 from filtercake.packing.result import read_record
 from filtercake.packing.spec import PackingSpec
 from filtercake.precision import LEAST_REPLICATES, UntilNarrow
+from filtercake.study import REPLICATE_COLUMNS, expand, summarise
 
 SPEC = PackingSpec(
     particles=150,
@@ -81,3 +85,49 @@ def test_the_search_is_bounded(tmp_path) -> None:
     rule = UntilNarrow(SPEC, 1e-4)
     assert len(pack_replicates(SPEC, csd, 8, tmp_path, "code", enough=rule)) == 8
     assert rule.half_width > 1e-4
+
+
+def test_the_summary_and_the_last_lines_say_what_was_not_reached(tmp_path) -> None:
+    rows = [
+        {"point": point, "porosity_interval_asked": asked, "status": "ok", "porosity": value}
+        for point, asked, values in (
+            ("narrow", 0.01, (0.350, 0.351, 0.352)),
+            ("wide", 0.01, (0.30, 0.35, 0.40)),
+            ("free", np.nan, (0.30, 0.40)),
+        )
+        for value in values
+    ]
+    table = summarise(pd.DataFrame(rows).reindex(columns=list(REPLICATE_COLUMNS)))
+    reached = dict(zip(table["point"], table["interval_reached"], strict=True))
+    assert reached == {"narrow": "yes", "wide": "no", "free": ""}
+    (tmp_path / "study").mkdir()
+    table.to_csv(tmp_path / "study" / "summary.csv", index=False)
+    said = console.success(tmp_path, {"study": {}})
+    assert "wide: the porosity's interval is 0.12 after 3 packings, not 0.01 (packing.porosity_interval)" in said
+    assert "narrow" not in said.partition("summary.csv")[2]
+
+
+def test_a_study_asks_for_an_interval(tmp_path) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(
+        """
+csds:
+  broad:
+    mixture: [{size_um: 30, volume_fraction: 0.3}, {size_um: 300, volume_fraction: 0.7}]
+  narrow:
+    mixture: [{size_um: 30, volume_fraction: 0.3}, {size_um: 40, volume_fraction: 0.7}]
+material: {density_kg_m3: 2000}
+packing: {porosity_interval: 0.002, max_replicates: 30, replicates: 4}
+sweeps:
+  - csd: [broad, narrow]
+"""
+    )
+    broad, narrow = expand(load_study(path), lambda _csd, _n: "embedded")
+    assert (narrow.spec.particles, narrow.spec.column_ratio) == (2000, 1.0)
+    assert (broad.porosity_interval, broad.replicates, broad.most_replicates) == (0.002, 4, 30)
+    # 4.6 x 4.6 x 10 largest diameters at 70 % solids
+    solids = 4.6 * 4.6 * 10 * 0.7 * 300e-6**3
+    mean = 1.0 / (0.3 / 30e-6**3 + 0.7 / 300e-6**3) * np.pi / 6
+    assert broad.spec.particles == pytest.approx(solids / mean, rel=1e-3)
+    side = (broad.spec.particles * mean / (0.35 * 2 * broad.spec.column_ratio)) ** (1 / 3)
+    assert side == pytest.approx(4.6 * 300e-6, rel=1e-3)
