@@ -24,6 +24,7 @@ from filtercake.calibration import (
     good_enough,
     leave_one_out,
     next_cohesions,
+    pooled,
     predict,
 )
 from filtercake.csd import CrystalSizeDistribution, from_table
@@ -426,10 +427,12 @@ def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
 def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Observation]) -> pd.DataFrame:
     """Tabulate measured against modelled resistances at the calibrated parameters, one row per measurement.
 
+    ``relative_uncertainty`` is as the fit takes it: with the scatter of measurements that contradict each other.
     ``left_out_m_kg`` is the resistance that the other distributions predict for this one; ``left_out_ln_error`` its
     error, in ln(alpha), against the weighted mean of the distribution's measurements.
     """
     friction = None if settings.fits_friction else settings.frictions[0]
+    means = pooled(observations)
     rows = []
     for item in observations:
         response = outcome.responses[item.csd, friction]
@@ -440,24 +443,18 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
                 "measurement": item.name,
                 "csd": item.csd,
                 "measured_m_kg": math.exp(item.ln_resistance),
-                "relative_uncertainty": item.standard_error,
+                "relative_uncertainty": math.hypot(item.standard_error, means[item.csd].scatter),
                 "modelled_m_kg": math.exp(float(mean[0])),
                 "modelled_low_m_kg": whole.low,
                 "modelled_high_m_kg": whole.high,
                 "packings_relative_error": math.sqrt(float(variance[0])),
-                "left_out_m_kg": math.exp(_mean_ln(observations, item.csd) + outcome.left_out[item.csd])
+                "left_out_m_kg": math.exp(means[item.csd].mean + outcome.left_out[item.csd])
                 if item.csd in outcome.left_out
                 else math.nan,
                 "left_out_ln_error": outcome.left_out.get(item.csd, math.nan),
             }
         )
     return pd.DataFrame(rows)
-
-
-def _mean_ln(observations: Sequence[Observation], csd: str) -> float:
-    """Weighted mean ln(alpha) of a distribution's measurements."""
-    own = [item for item in observations if item.csd == csd]
-    return float(np.average([item.ln_resistance for item in own], weights=[item.standard_error**-2 for item in own]))
 
 
 def objective_table(outcome: Outcome, settings: Settings) -> pd.DataFrame:

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from filtercake import calibration_study as study
-from filtercake.calibration import Observation, Parameter
+from filtercake.calibration import Observation, Parameter, pooled
 from filtercake.calibration_study import BATCHES, Candidate, Settings, Task, choose_round, conclude
 from filtercake.csd import CrystalSizeDistribution, mixture
 from filtercake.drum_filter import DrumFilter, area
@@ -157,7 +157,7 @@ class TestOutcome:
         outcome = conclude(chosen, OBSERVATIONS, table)
         assert outcome.responses["fine", 0.0].points.shape == (study.COARSE - 1, 1)
         assert outcome.fit.estimates[0].low < TRUTH < outcome.fit.estimates[0].high
-        with pytest.raises(CalibrationError, match="no packings of fine"):
+        with pytest.raises(CalibrationError, match="not enough packings of fine"):
             conclude(chosen, OBSERVATIONS, table[table["csd"] != "fine"])
 
     def test_rivals_are_compared(self) -> None:
@@ -202,6 +202,20 @@ class TestOutcome:
         fine = curve[curve["csd"] == "fine"]
         exact = [law("fine", s, 0.0) for s in fine["cohesion_kJ_m3"]]
         assert np.abs(np.log(fine["resistance_m_kg"]) - exact).max() < 0.08
+
+    def test_the_parity_table_has_the_errors_of_the_fit(self) -> None:
+        """Measurements that contradict each other carry their scatter; figures average them with it."""
+        twice = [*OBSERVATIONS, Observation("again", "fine", law("fine", 80.0, 0.0), 0.01)]
+        _, table = self.outcome()
+        outcome = conclude(settings(), twice, table)
+        assert "contradiction" in {finding.kind for finding in outcome.findings}
+        parity = study.parity_table(outcome, settings(), twice)
+        own = parity[parity["csd"] == "fine"]
+        scatter = pooled(twice)["fine"].scatter
+        assert own["relative_uncertainty"].tolist() == pytest.approx([math.hypot(scatter, e) for e in (0.02, 0.01)])
+        assert parity.loc[1, "relative_uncertainty"] == 0.02
+        mean = np.average(np.log(own["measured_m_kg"]), weights=own["relative_uncertainty"] ** -2)
+        assert np.log(own["left_out_m_kg"]).tolist() == pytest.approx([mean + outcome.left_out["fine"]] * 2)
 
 
 class TestPrediction:
