@@ -67,7 +67,7 @@ def scatter(values: ArrayLike, errors: ArrayLike) -> float:
     """
     value, error = _arrays(values, errors)
     freedom = value.size - 1
-    if _squares(value, error) <= freedom:
+    if freedom == 0 or _squares(value, error) <= freedom:
         return 0.0
     # the squares fall as the scatter grows, and are below the degrees of freedom once it is the whole spread
     widest = 1.01 * float(np.ptp(value))

@@ -247,9 +247,9 @@ class TestFindings:
             assert numbers in finding.text
 
     def test_frictions_that_both_fail_are_hard_to_tell_apart(self) -> None:
-        """Where the errors are known from the distributions alone, twice the squares on two degrees say nothing."""
+        """Where the errors are known from the distributions alone, seven times the squares say nothing."""
         bad = replace(fitted(1), discrepancy=0.2)
-        worse = replace(bad, residual=np.array([0.3, -0.2, 0.2]), discrepancy=0.3)
+        worse = replace(bad, residual=np.array([0.6, -0.4, 0.4]), discrepancy=0.3)
         bad = replace(bad, residual=np.array([0.2, -0.2, 0.1]))
         (finding,) = compare_friction({0.0: bad, 0.05: worse})
         assert "do not tell" in finding.text
