@@ -30,6 +30,8 @@ SHRINKAGE = 8.0
 """Degrees of freedom that the pooled variance of replicates weighs against a point's own."""
 LENGTH_SCALES = (0.1, 3.0)
 """Shortest and longest correlation length of ln(alpha), over the range of the parameter."""
+ADVISED_FRICTIONS = (0.0, 0.05)
+"""What the paper advises for dense and for loose cakes."""
 FLAT = 0.8
 """Share of a parameter's range from which its interval says that it is not determined."""
 DRAWS = 20_000
@@ -519,7 +521,7 @@ def predict(calibration: Calibration, response: Response) -> Prediction:
 
 def advised_friction(porosity: float) -> float:
     """Coefficient of friction for a cake of some porosity: none under 0.4, 0.05 above (paper, Fig. 15)."""
-    return 0.0 if porosity < 0.4 else 0.05
+    return ADVISED_FRICTIONS[0] if porosity < 0.4 else ADVISED_FRICTIONS[1]
 
 
 def compare_friction(fits: Mapping[float, Calibration]) -> tuple[Finding, ...]:

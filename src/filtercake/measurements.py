@@ -54,6 +54,9 @@ REPEATABILITY: Final = 0.05
 SMALLEST_RELATIVE_SE: Final = 1e-6
 """Relative standard error of a resistance from data without noise."""
 
+NORMAL95: Final = float(special.ndtri(0.975))
+"""Half-width of a normal variable's 95 % interval over its standard deviation."""
+
 FIT_COLUMNS: Final = (
     "test",
     "csd",
@@ -81,7 +84,6 @@ COMPRESSIBILITY_COLUMNS: Final = (
 )
 
 _SQUARE_CENTIMETRE: Final = 1e-4
-_NORMAL95: Final = float(special.ndtri(0.975))
 _SEPARATORS: Final = ("\t", ";", ",")
 _NAMES: Final = {
     "time": ("t", "time", "filtration_time", "elapsed_time", "time_elapsed"),
@@ -327,7 +329,7 @@ def _exponent_limit(fit: CompressibilityFit, entries: Sequence[Measurement]) -> 
         return fit.exponent_ci95
     one, other = entries
     apart = abs(math.log((one.pressure_drop or math.nan) / (other.pressure_drop or math.nan)))
-    return _NORMAL95 * math.hypot(one.relative_se, other.relative_se) / apart
+    return NORMAL95 * math.hypot(one.relative_se, other.relative_se) / apart
 
 
 def with_pressure(measurements: Measurements) -> dict[str, list[Measurement]]:
@@ -742,7 +744,7 @@ def _peers(entry: Measurement, measured: Sequence[Measurement]) -> list[Measurem
     return [
         peer
         for peer in measured
-        if peer.csd == entry.csd and peer.pressure_drop is not None and _same_pressure(peer.pressure_drop, own)
+        if peer.csd == entry.csd and peer.pressure_drop is not None and same_pressure(peer.pressure_drop, own)
     ]
 
 
@@ -750,7 +752,8 @@ def _logs(measured: Sequence[Measurement]) -> list[float]:
     return [math.log(entry.resistance) for entry in measured]
 
 
-def _same_pressure(one: float, other: float) -> bool:
+def same_pressure(one: float, other: float) -> bool:
+    """Whether two pressure drops are the same within ``SAME_PRESSURE``."""
     return max(one, other) <= (1.0 + SAME_PRESSURE) * min(one, other)
 
 
