@@ -558,7 +558,7 @@ def _compared(taken: float, own: Calibration, friction: float, rival: Calibratio
         needed = float(stats.f.ppf(CONFIDENCE, 1, freedom)) * least / freedom
     numbers = (
         f"at equal errors chi-square {squares[friction]:.1f} with {friction:g} and {squares[taken]:.1f} with "
-        f"{taken:g}; a difference of {needed:.1f} tells them apart"
+        f"{taken:g}; it takes a difference of {needed:.1f} to tell them apart"
     )
     if most - least > needed:
         return f"the measurements prefer a friction of {better:g} to {worse:g} ({numbers})"

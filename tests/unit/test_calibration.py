@@ -243,8 +243,8 @@ class TestFindings:
             vague = replace(right, residual=shift, packed_variance=4.0 * right.packed_variance)
             (finding,) = compare_friction({0.0: right, 0.05: vague})
             assert said in finding.text
-            numbers = f"chi-square {squares + more:.1f} with 0.05 and {squares:.1f} with 0; a difference of 3.8"
-            assert numbers in finding.text
+            assert f"chi-square {squares + more:.1f} with 0.05 and {squares:.1f} with 0; " in finding.text
+            assert "it takes a difference of 3.8 to tell them apart" in finding.text
 
     def test_frictions_that_both_fail_are_hard_to_tell_apart(self) -> None:
         """Where the errors are known from the distributions alone, seven times the squares say nothing."""
