@@ -9,7 +9,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin bed-size references resume retry lock setup clean help
+.PHONY: run benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -80,6 +80,10 @@ twin: setup ## twenty calibrations whose answer is known, with and without frict
 
 bed-size: setup ## several beds of N = 25 000 against one of N = 100 000, alum (about 10 min)
 	$(SNAKEMAKE) bed_size
+
+synthetic: setup ## remake the synthetic filtration tests of config/measurements (about 2 min on 2 cores)
+	$(SNAKEMAKE) results/synthetic_truth/summary.csv --config studies=config/benchmarks/synthetic_truth.yaml
+	$(BIN)/python tests/data/make_measurements.py results/synthetic_truth/summary.csv
 
 references: setup ## remake the stored LIGGGHTS trajectories that the tests compare the embedded engine with
 	$(BIN)/python tests/data/force_scenes.py

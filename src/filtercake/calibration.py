@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ import numpy as np
 from scipy import ndimage, optimize, stats
 
 from filtercake.errors import CalibrationError
+from filtercake.pooling import Pool, improbable, pool
 from filtercake.units import FloatArray
 
 if TYPE_CHECKING:
@@ -29,8 +30,8 @@ SHRINKAGE = 8.0
 """Degrees of freedom that the pooled variance of replicates weighs against a point's own."""
 LENGTH_SCALES = (0.1, 3.0)
 """Shortest and longest correlation length of ln(alpha), over the range of the parameter."""
-MISFIT = 0.05
-"""Probability of the sum of squares below which the packings do not describe the measurements."""
+ADVISED_FRICTIONS = (0.0, 0.05)
+"""What the paper advises for dense and for loose cakes."""
 FLAT = 0.8
 """Share of a parameter's range from which its interval says that it is not determined."""
 DRAWS = 20_000
@@ -114,7 +115,8 @@ class Finding:
     Attributes
     ----------
     kind : str
-        ``flat``, ``several``, ``edge``, ``zero``, ``soft``, ``confounded``, ``misfit`` or ``friction``.
+        ``flat``, ``several``, ``edge``, ``zero``, ``soft``, ``confounded``, ``contradiction``, ``pressure``,
+        ``misfit`` or ``friction``.
     text : str
         The same in a sentence.
     """
@@ -141,8 +143,6 @@ class Calibration:
         Deviance up to which parameters belong to the 95 % interval of one of them.
     chi_square : float
         Weighted sum of squares at the best parameters, with the discrepancy left out.
-    objective : float
-        -2 ln(likelihood) at the best parameters, constants left out.
     degrees_of_freedom : int
         Distributions measured less parameters fitted; at least 0.
     discrepancy : float
@@ -152,6 +152,8 @@ class Calibration:
         What a user must know.
     model_share : float
         Share of the packings in the variance of the residuals at the best parameters.
+    residual, measured_variance, packed_variance : ndarray, shape (distributions,)
+        Measured less packed ln(alpha) at the best parameters, and the variances of both, by distribution.
     """
 
     parameters: tuple[Parameter, ...]
@@ -160,11 +162,13 @@ class Calibration:
     estimates: tuple[Estimate, ...]
     threshold: float
     chi_square: float
-    objective: float
     degrees_of_freedom: int
     discrepancy: float
     findings: tuple[Finding, ...]
     model_share: float
+    residual: FloatArray
+    measured_variance: FloatArray
+    packed_variance: FloatArray
 
     @property
     def best(self) -> tuple[float, ...]:
@@ -259,8 +263,9 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
     """Find the parameters at which the packings' resistances are the measured ones.
 
     Maximum likelihood: weighted least squares in ln(alpha), the weights made of the measurements' errors and of the
-    packings' own. Measurements of one distribution share the error of its packings. Where they scatter more than
-    both allow, a discrepancy between measurements and packings, one per distribution, is estimated and added.
+    packings' own. Measurements of one distribution share the error of its packings. Where they contradict each other,
+    their scatter is added to the errors of each. Where the distributions scatter more than all this allows, a
+    discrepancy between measurements and packings, one per distribution, is estimated and added.
 
     Parameters
     ----------
@@ -278,7 +283,7 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
         raise CalibrationError("there is no measurement to calibrate with")
     missing = sorted({item.csd for item in observations} - set(responses))
     if missing:
-        raise CalibrationError(f"no packings of {', '.join(missing)}: every point failed")
+        raise CalibrationError(f"not enough packings of {', '.join(missing)} for a fit")
     parameters = responses[observations[0].csd].parameters
     axes = tuple(
         np.linspace(parameter.low, parameter.high, points) for parameter, points in zip(parameters, GRID, strict=False)
@@ -289,8 +294,7 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
     freedom = max(len(chosen.names) - len(parameters), 0)
     chi_square, discrepancy = _misfit(residual, chosen, freedom)
     deviance = _deviance(residual, chosen, discrepancy).reshape(shape)
-    least = float(deviance.min())
-    deviance -= least
+    deviance -= deviance.min()
     threshold = float(stats.chi2.ppf(CONFIDENCE, 1))
     estimates = tuple(
         _profile(parameter, axis, deviance, number, threshold)
@@ -306,13 +310,24 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
         estimates=estimates,
         threshold=threshold,
         chi_square=chi_square,
-        objective=least,
         degrees_of_freedom=freedom,
         discrepancy=discrepancy,
         findings=(),
         model_share=share,
+        residual=residual[:, at_best],
+        measured_variance=chosen.measured,
+        packed_variance=packed,
     )
-    return replace(calibration, findings=_findings(calibration, len(chosen.names)))
+    return replace(calibration, findings=(*_contradictions(pooled(observations)), *_findings(calibration)))
+
+
+def pooled(observations: Sequence[Observation]) -> dict[str, Pool]:
+    """Average ln(alpha) by distribution, the scatter of measurements that contradict each other included."""
+    found = {}
+    for name in sorted({item.csd for item in observations}):
+        own = [item for item in observations if item.csd == name]
+        found[name] = pool([item.ln_resistance for item in own], [item.standard_error for item in own])
+    return found
 
 
 @dataclass(frozen=True)
@@ -331,17 +346,11 @@ def _residuals(
 
     The measurements of a distribution enter by their weighted mean: it holds all they say about the parameters.
     """
-    names = tuple(sorted({item.csd for item in observations}))
-    measured, residual, model = [], [], []
-    for name in names:
-        own = [item for item in observations if item.csd == name]
-        weight = np.array([item.standard_error**-2 for item in own])
-        value = float(np.average([item.ln_resistance for item in own], weights=weight))
-        mean, variance = responses[name](grid)
-        measured.append(1.0 / weight.sum())
-        residual.append(value - mean)
-        model.append(variance)
-    return np.array(residual), _Groups(names, np.array(measured), np.array(model))
+    measured = pooled(observations)
+    packed = [responses[name](grid) for name in measured]
+    residual = np.array([own.mean - mean for own, (mean, _) in zip(measured.values(), packed, strict=True)])
+    variance = np.array([own.variance for own in measured.values()])
+    return residual, _Groups(tuple(measured), variance, np.array([variance for _, variance in packed]))
 
 
 def _squares(residual: FloatArray, groups: _Groups, discrepancy: float) -> tuple[FloatArray, FloatArray]:
@@ -360,7 +369,7 @@ def _misfit(residual: FloatArray, groups: _Groups, freedom: int) -> tuple[float,
         return float(_squares(residual, groups, discrepancy)[0].min())
 
     chi_square = least(0.0)
-    if freedom < 1 or stats.chi2.sf(chi_square, freedom) >= MISFIT:
+    if not improbable(chi_square, freedom):
         return chi_square, 0.0
     widest = float(np.sqrt(np.mean(residual**2, axis=0).min() * len(groups.names) / freedom))
     return chi_square, float(optimize.brentq(lambda d: least(d) - freedom, 0.0, 1.01 * widest + 1e-9))
@@ -401,8 +410,24 @@ def _crossing(axis: FloatArray, profile: FloatArray, last: int, step: int, thres
     return float(axis[last] + share * (axis[beyond] - axis[last]))
 
 
-def _findings(calibration: Calibration, distributions: int) -> tuple[Finding, ...]:
+def _contradictions(pools: Mapping[str, Pool]) -> Iterable[Finding]:
+    for name, own in pools.items():
+        if own.scatter > 0.0:
+            text = (
+                f"the {own.degrees_of_freedom + 1} measurements of {name} contradict each other (chi-square "
+                f"{own.chi_square:.1f} with {_degrees(own.degrees_of_freedom)} of freedom): a scatter of "
+                f"{100.0 * own.scatter:.0f} % is added to the error of each"
+            )
+            yield Finding("contradiction", text)
+
+
+def _degrees(number: int) -> str:
+    return f"{number} degree{'' if number == 1 else 's'}"
+
+
+def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     found: list[Finding] = []
+    distributions = calibration.residual.size
     for estimate, axis in zip(calibration.estimates, calibration.axes, strict=True):
         found += _findings_of(estimate, float(axis[1] - axis[0]))
     fitted = len(calibration.parameters)
@@ -416,12 +441,12 @@ def _findings(calibration: Calibration, distributions: int) -> tuple[Finding, ..
             )
         )
     if calibration.discrepancy > 0.0:
-        degrees = f"{calibration.degrees_of_freedom} degree{'s' if calibration.degrees_of_freedom > 1 else ''}"
         found.append(
             Finding(
                 "misfit",
                 "no parameters describe all measurements within their errors "
-                f"(chi-square {calibration.chi_square:.1f} with {degrees} of freedom): "
+                f"(chi-square {calibration.chi_square:.1f} with "
+                f"{_degrees(calibration.degrees_of_freedom)} of freedom): "
                 f"a discrepancy of {100.0 * calibration.discrepancy:.0f} % per distribution is added to the errors",
             )
         )
@@ -466,16 +491,13 @@ def leave_one_out(observations: Sequence[Observation], responses: Mapping[str, R
 
     Empty where the other distributions are fewer than the parameters.
     """
-    names = sorted({item.csd for item in observations})
+    measured = pooled(observations)
     errors: dict[str, float] = {}
-    fitted = len(responses[names[0]].parameters) if names else 0
-    for name in names if len(names) > fitted else []:
-        own = [item for item in observations if item.csd == name]
+    fitted = max((len(responses[name].parameters) for name in measured), default=0)
+    for name in measured if len(measured) > fitted else []:
         others = [item for item in observations if item.csd != name]
         best = calibrate(others, responses).best
-        weight = np.array([item.standard_error**-2 for item in own])
-        measured = float(np.average([item.ln_resistance for item in own], weights=weight))
-        errors[name] = float(responses[name](np.array([best]))[0][0]) - measured
+        errors[name] = float(responses[name](np.array([best]))[0][0]) - measured[name].mean
     return errors
 
 
@@ -499,11 +521,16 @@ def predict(calibration: Calibration, response: Response) -> Prediction:
 
 def advised_friction(porosity: float) -> float:
     """Coefficient of friction for a cake of some porosity: none under 0.4, 0.05 above (paper, Fig. 15)."""
-    return 0.0 if porosity < 0.4 else 0.05
+    return ADVISED_FRICTIONS[0] if porosity < 0.4 else ADVISED_FRICTIONS[1]
 
 
 def compare_friction(fits: Mapping[float, Calibration]) -> tuple[Finding, ...]:
     """Say which of several fixed coefficients of friction the measurements prefer.
+
+    Both fits of a comparison are judged by the same errors, or the friction that more packings were made of would
+    win by being packed more often: the larger variance of the packings, and the discrepancy of the fit that needs
+    less of it. Where even that one needs some, the errors are known from the distributions alone, and F takes the
+    place of chi-square.
 
     Parameters
     ----------
@@ -513,21 +540,30 @@ def compare_friction(fits: Mapping[float, Calibration]) -> tuple[Finding, ...]:
     Returns
     -------
     tuple of Finding
-        One per rival: whether it describes the measurements better, worse or as well as the one taken. -2 ln of the
-        likelihoods' ratio must exceed 3.84 to say so; it holds the discrepancy that either needs.
+        One per rival: whether it describes the measurements better, worse or as well as the one taken.
     """
     (taken, own), *rivals = fits.items()
-    found = []
-    for friction, fit in rivals:
-        gap = fit.objective - own.objective
-        numbers = f"chi-square {fit.chi_square:.1f} against {own.chi_square:.1f}"
-        if abs(gap) <= stats.chi2.ppf(CONFIDENCE, 1):
-            text = f"the measurements do not tell a friction of {friction:g} from {taken:g} ({numbers})"
-        else:
-            better, worse = (taken, friction) if gap > 0.0 else (friction, taken)
-            text = f"the measurements prefer a friction of {better:g} to {worse:g} ({numbers})"
-        found.append(Finding("friction", text))
-    return tuple(found)
+    return tuple(Finding("friction", _compared(taken, own, friction, fit)) for friction, fit in rivals)
+
+
+def _compared(taken: float, own: Calibration, friction: float, rival: Calibration) -> str:
+    discrepancy = min(own.discrepancy, rival.discrepancy)
+    packed = np.maximum(own.packed_variance, rival.packed_variance)
+    variance = own.measured_variance + packed + discrepancy**2
+    squares = {mu: float(np.sum(fit.residual**2 / variance)) for mu, fit in ((taken, own), (friction, rival))}
+    (better, least), (worse, most) = sorted(squares.items(), key=lambda item: item[1])
+    needed = float(stats.chi2.ppf(CONFIDENCE, 1))
+    if discrepancy > 0.0:
+        freedom = own.degrees_of_freedom
+        needed = float(stats.f.ppf(CONFIDENCE, 1, freedom)) * least / freedom
+    numbers = (
+        f"at equal errors chi-square {squares[friction]:.1f} with {friction:g} and {squares[taken]:.1f} with "
+        f"{taken:g}; it takes a difference of {needed:.1f} to tell them apart"
+    )
+    if most - least > needed:
+        return f"the measurements prefer a friction of {better:g} to {worse:g} ({numbers})"
+    why = ", as a cohesion makes up for either" if own.degrees_of_freedom == 0 else ""
+    return f"the measurements do not tell a friction of {friction:g} from {taken:g}{why} ({numbers})"
 
 
 def next_cohesions(

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from filtercake import contact
-from filtercake.calibration import Observation, Parameter, advised_friction
+from filtercake.calibration import ADVISED_FRICTIONS, Finding, Observation, Parameter, advised_friction
 from filtercake.calibration_study import BATCHES, Candidate, Settings
 from filtercake.config import (
     NAME,
@@ -30,11 +30,21 @@ from filtercake.config_loading import LoadedStudy, find_studies, load_study, par
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
 from filtercake.fence import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
-from filtercake.measurements import Measurements, load_measurements
+from filtercake.filtration import CompressibilityFit
+from filtercake.measurements import (
+    NORMAL95,
+    Measurement,
+    Measurements,
+    compressibility_by_csd,
+    load_measurements,
+    pressure_effects,
+    same_pressure,
+)
 from filtercake.resistance import implied_porosity
 from filtercake.study import expand
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL
+from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL
 
+Pressure = Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False), TO_NUMBER]
 ChooseEngine = Callable[[CrystalSizeDistribution, int], str]
 
 
@@ -70,6 +80,11 @@ class Calibration(Model):
     cohesion_kJ_m3: CohesionRange = Field(  # noqa: N815
         default=CohesionRange(), description="Where the cohesion is looked for."
     )
+    pressure_kPa: Pressure | None = Field(  # noqa: N815
+        default=None,
+        description="Pressure drop to calibrate at, kPa: resistances measured at several are brought to it by their "
+        "compressibility. If left out, all are taken as they are, and a change with pressure is said.",
+    )
     friction: Friction | Literal["advised"] = Field(
         default="advised",
         description="Coefficient of friction; advised takes none where the measured resistances imply a mean porosity "
@@ -78,8 +93,10 @@ class Calibration(Model):
     fit_friction: Annotated[list[Friction], Field(min_length=3)] | None = Field(
         default=None, description="Fit the friction too, with packings at these values (at least 3)."
     )
-    rival_friction: list[Friction] = Field(
-        default=[], description="Other fixed frictions for which the cohesion is fitted too, to compare."
+    rival_friction: list[Friction] | None = Field(
+        default=None,
+        description="Other fixed frictions for which the cohesion is fitted too, to compare; [] for none. If left out, "
+        "the other one of 0 and 0.05, or the advised one of them, where two or more distributions were measured.",
     )
     estimator: Literal["interior", "as_published"] = Field(
         default="interior",
@@ -124,6 +141,10 @@ class LoadedCalibration:
         The study, under the calibration's name and with its replicates and warnings.
     measurements : Measurements
         What was measured.
+    observations : tuple of Observation
+        The same as the fit takes it.
+    doubts : tuple of Finding
+        What must be known of the measurements before believing any fit.
     implied_porosity : float
         Mean porosity that the measured resistances imply.
     frictions : tuple of float
@@ -137,6 +158,8 @@ class LoadedCalibration:
     model: Calibration
     study: LoadedStudy
     measurements: Measurements
+    observations: tuple[Observation, ...]
+    doubts: tuple[Finding, ...]
     implied_porosity: float
     frictions: tuple[float, ...]
     warnings: tuple[str, ...]
@@ -222,7 +245,8 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
     problems = list(_problems(model, study, measurements, path))
     if problems:
         raise ConfigError(problems)
-    porosity = _implied_porosity(study, measurements)
+    observations = tuple(_observations(measurements, model.pressure_kPa))
+    porosity = _implied_porosity(study, observations)
     name = f"calibration_{path.stem}"
     warnings = (*measurements.warnings, *_doubts(model, study, path))
     asked = {"replicates": model.replicates, "engine": model.engine or study.model.packing.engine}
@@ -234,8 +258,10 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
         model=model,
         study=replace(study, name=name, model=own, warnings=warnings),
         measurements=measurements,
+        observations=observations,
+        doubts=tuple(_measured_doubts(measurements, model.pressure_kPa)),
         implied_porosity=porosity,
-        frictions=_frictions(model, porosity),
+        frictions=_frictions(model, porosity, len({item.csd for item in observations})),
         warnings=warnings,
     )
 
@@ -276,15 +302,42 @@ def settings_of(calibration: LoadedCalibration) -> Settings:
         sphericity=material.sphericity,
         implied_porosity=calibration.implied_porosity,
         soft_above=_cohesion_at(DOUBTFUL_RELATIVE_OVERLAP, calibration.study),
+        doubts=calibration.doubts,
     )
 
 
-def observations_of(calibration: LoadedCalibration) -> list[Observation]:
-    """Return the measurements as the fit takes them."""
-    return [
-        Observation(item.name, item.csd, math.log(item.resistance), item.relative_se)
-        for item in calibration.measurements.measurements
-    ]
+def _observations(measurements: Measurements, pressure: float | None) -> Iterable[Observation]:
+    """Measurements as the fit takes them; those at several pressures as one at the pressure asked for, in kPa."""
+    if pressure is not None:
+        for csd, fit in _brought(measurements, pressure).items():
+            value, _, high = (float(end) for end in fit.resistance_at(pressure * KILOPASCAL))
+            yield Observation(f"{csd} at {pressure:g} kPa", csd, math.log(value), math.log(high / value) / NORMAL95)
+    for item in _as_they_are(measurements, pressure):
+        yield Observation(item.name, item.csd, math.log(item.resistance), item.relative_se)
+
+
+def _brought(measurements: Measurements, pressure: float | None) -> dict[str, CompressibilityFit]:
+    """Compressibility of the distributions whose resistance is brought to a pressure."""
+    return {} if pressure is None else compressibility_by_csd(measurements)
+
+
+def _as_they_are(measurements: Measurements, pressure: float | None) -> list[Measurement]:
+    """Measurements that enter as they are."""
+    brought = _brought(measurements, pressure)
+    return [item for item in measurements.measurements if item.pressure_drop is None or item.csd not in brought]
+
+
+def _measured_doubts(measurements: Measurements, pressure: float | None) -> Iterable[Finding]:
+    yield from (Finding("contradiction", text) for text in measurements.contradictions)
+    if pressure is None:
+        for text in pressure_effects(measurements).values():
+            yield Finding("pressure", f"{text}, which packings do not: give a pressure_kPa to calibrate at")
+        return
+    wanted = pressure * KILOPASCAL
+    for item in _as_they_are(measurements, pressure):
+        if item.pressure_drop is None or not same_pressure(item.pressure_drop, wanted):
+            at = "an unknown pressure" if item.pressure_drop is None else f"{item.pressure_drop / KILOPASCAL:g} kPa"
+            yield Finding("pressure", f"{item.name} of {item.csd} is of {at}, and taken as it is for {pressure:g} kPa")
 
 
 def _study_path(model: Calibration, path: Path, studies: Path) -> Path:
@@ -307,6 +360,10 @@ def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements
     for index, name in enumerate(model.predict):
         if name not in study.csds:
             yield Problem(str(path), f"predict[{index}]", repr(name), f"not in the study; allowed: {known}")
+    for csd, fit in _brought(measurements, model.pressure_kPa).items():
+        if not math.isfinite(fit.exponent_ci95):
+            text = f"two measurements of {csd} give no interval at another pressure: add a third, or leave the key out"
+            yield Problem(str(path), "pressure_kPa", f"{model.pressure_kPa:g}", text)
     limit = _cohesion_at(LARGEST_RELATIVE_OVERLAP, study)
     if model.cohesion_kJ_m3.high > limit:
         text = f"must be at most {int(limit)} kJ/m3 at the study's Young's modulus: above it contacts are too soft"
@@ -328,20 +385,28 @@ def _cohesion_at(overlap: float, study: LoadedStudy) -> float:
     return contact.cohesion_at_overlap(overlap, modulus, material.poisson_ratio) / KILOJOULE_PER_M3
 
 
-def _implied_porosity(study: LoadedStudy, measurements: Measurements) -> float:
+def _implied_porosity(study: LoadedStudy, observations: Iterable[Observation]) -> float:
     material = study.model.material
     return float(
         np.mean(
             [
-                implied_porosity(item.resistance, study.csds[item.csd].full, material.density, material.sphericity)
-                for item in measurements.measurements
+                implied_porosity(
+                    math.exp(item.ln_resistance), study.csds[item.csd].full, material.density, material.sphericity
+                )
+                for item in observations
             ]
         )
     )
 
 
-def _frictions(model: Calibration, porosity: float) -> tuple[float, ...]:
+def _frictions(model: Calibration, porosity: float, distributions: int) -> tuple[float, ...]:
     if model.fit_friction is not None:
         return tuple(model.fit_friction)
-    main = advised_friction(porosity) if model.friction == "advised" else model.friction
-    return (main, *dict.fromkeys(value for value in model.rival_friction if value != main))
+    advised = advised_friction(porosity)
+    main = advised if model.friction == "advised" else model.friction
+    rivals = model.rival_friction
+    if rivals is None:  # with one distribution a cohesion makes up for any friction
+        others = [value for value in ADVISED_FRICTIONS if value != main]
+        rival = others[0] if len(others) == 1 else advised
+        rivals = [rival] if distributions > 1 else []
+    return (main, *dict.fromkeys(value for value in rivals if value != main))

@@ -24,6 +24,7 @@ from filtercake.calibration import (
     good_enough,
     leave_one_out,
     next_cohesions,
+    pooled,
     predict,
 )
 from filtercake.csd import CrystalSizeDistribution, FullAndTruncated, from_table
@@ -69,6 +70,8 @@ class Settings:
         Mean porosity that the measured resistances imply.
     soft_above : float
         Cohesion from which the softness of the contacts matters, kJ/m3.
+    doubts : tuple of Finding
+        What must be known of the measurements themselves.
     """
 
     parameters: tuple[Parameter, ...]
@@ -83,6 +86,7 @@ class Settings:
     sphericity: float
     implied_porosity: float
     soft_above: float
+    doubts: tuple[Finding, ...] = ()
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Settings:
@@ -91,6 +95,7 @@ class Settings:
             key: tuple(value) if isinstance(value, list) else value for key, value in values.items()
         }
         found["parameters"] = tuple(Parameter(**item) for item in values["parameters"])
+        found["doubts"] = tuple(Finding(**item) for item in values["doubts"])
         return cls(**found)
 
     def as_dict(self) -> dict[str, Any]:
@@ -344,8 +349,31 @@ def fit_main(settings: Settings, observations: Sequence[Observation], simulated:
     CalibrationError
         If a measured distribution has not enough packings.
     """
+    return calibrate(observations, _main_responses(settings, simulated))
+
+
+def _main_responses(settings: Settings, simulated: pd.DataFrame) -> dict[str, Response]:
     friction = None if settings.fits_friction else settings.frictions[0]
-    return calibrate(observations, responses_at(settings, simulated, settings.measured, friction))
+    responses = responses_at(settings, simulated, settings.measured, friction)
+    shortage = _shortage(settings.measured, responses, simulated, friction)
+    if shortage:
+        raise CalibrationError(f"not enough accepted packings for a fit: {shortage}")
+    return responses
+
+
+def _shortage(
+    wanted: Sequence[str], found: Mapping[str, Response], simulated: pd.DataFrame, friction: float | None
+) -> str:
+    """Say which distributions have too few accepted packings for a smooth model, and how many; empty if none."""
+    rows = simulated if friction is None else simulated[np.isclose(simulated["friction"], friction)]
+    counts = []
+    for name in [name for name in wanted if name not in found]:
+        own = rows[rows["csd"] == name]
+        made, good = (
+            len(part[["cohesion_kJ_m3", "friction"]].drop_duplicates()) for part in (own, own[own["status"] == "ok"])
+        )
+        counts.append(f"{name} has them at {good} of {made} points")
+    return f"{', '.join(counts)}; at least 3 are needed, one of them with two packings" if counts else ""
 
 
 def conclude(settings: Settings, observations: Sequence[Observation], simulated: pd.DataFrame) -> Outcome:
@@ -356,23 +384,39 @@ def conclude(settings: Settings, observations: Sequence[Observation], simulated:
     CalibrationError
         If a measured distribution has not enough packings.
     """
-    frictions: tuple[float | None, ...] = (None,) if settings.fits_friction else settings.frictions
-    by_friction = {mu: responses_at(settings, simulated, settings.measured, mu) for mu in frictions}
-    main = by_friction[frictions[0]]
+    main = _main_responses(settings, simulated)
     fit = calibrate(observations, main)
-    rivals = {}
-    for mu, responses in by_friction.items():
-        if mu is not None and set(settings.measured) <= set(responses):
+    by_friction: dict[float | None, dict[str, Response]] = {
+        None if settings.fits_friction else settings.frictions[0]: main
+    }
+    rivals = {} if settings.fits_friction else {settings.frictions[0]: fit}
+    skipped = []
+    for mu in () if settings.fits_friction else settings.frictions[1:]:
+        responses = by_friction[mu] = responses_at(settings, simulated, settings.measured, mu)
+        shortage = _shortage(settings.measured, responses, simulated, mu)
+        if shortage:
+            skipped.append(
+                Finding("friction", f"a friction of {mu:g} is not compared, for want of accepted packings: {shortage}")
+            )
+        else:
             rivals[mu] = calibrate(observations, responses)
     compared = compare_friction(rivals) if rivals else ()
-    findings = (*fit.findings, *compared, *_advice(settings, fit), *_soft(settings, fit))
+    friction = (*compared, *skipped, *_untested(settings), *_advice(settings, fit))
     return Outcome(
         fit=fit,
         rivals=rivals,
         left_out=leave_one_out(observations, main),
-        findings=findings,
+        findings=(*settings.doubts, *fit.findings, *friction, *_soft(settings, fit)),
         responses={(name, mu): r for mu, responses in by_friction.items() for name, r in responses.items()},
     )
+
+
+def _untested(settings: Settings) -> tuple[Finding, ...]:
+    """Say where the measurements have no say in the friction."""
+    if len(settings.measured) > 1 or len(settings.frictions) > 1:
+        return ()
+    text = f"one measured distribution cannot test the friction taken, {settings.frictions[0]:g}: a cohesion makes up"
+    return (Finding("friction", f"{text} for another one"),)
 
 
 def _advice(settings: Settings, fit: Calibration) -> tuple[Finding, ...]:
@@ -431,10 +475,12 @@ def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
 def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Observation]) -> pd.DataFrame:
     """Tabulate measured against modelled resistances at the calibrated parameters, one row per measurement.
 
+    ``relative_uncertainty`` is as the fit takes it: with the scatter of measurements that contradict each other.
     ``left_out_m_kg`` is the resistance that the other distributions predict for this one; ``left_out_ln_error`` its
     error, in ln(alpha), against the weighted mean of the distribution's measurements.
     """
     friction = None if settings.fits_friction else settings.frictions[0]
+    means = pooled(observations)
     rows = []
     for item in observations:
         response = outcome.responses[item.csd, friction]
@@ -445,24 +491,18 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
                 "measurement": item.name,
                 "csd": item.csd,
                 "measured_m_kg": math.exp(item.ln_resistance),
-                "relative_uncertainty": item.standard_error,
+                "relative_uncertainty": math.hypot(item.standard_error, means[item.csd].scatter),
                 "modelled_m_kg": math.exp(float(mean[0])),
                 "modelled_low_m_kg": whole.low,
                 "modelled_high_m_kg": whole.high,
                 "packings_relative_error": math.sqrt(float(variance[0])),
-                "left_out_m_kg": math.exp(_mean_ln(observations, item.csd) + outcome.left_out[item.csd])
+                "left_out_m_kg": math.exp(means[item.csd].mean + outcome.left_out[item.csd])
                 if item.csd in outcome.left_out
                 else math.nan,
                 "left_out_ln_error": outcome.left_out.get(item.csd, math.nan),
             }
         )
     return pd.DataFrame(rows)
-
-
-def _mean_ln(observations: Sequence[Observation], csd: str) -> float:
-    """Weighted mean ln(alpha) of a distribution's measurements."""
-    own = [item for item in observations if item.csd == csd]
-    return float(np.average([item.ln_resistance for item in own], weights=[item.standard_error**-2 for item in own]))
 
 
 def objective_table(outcome: Outcome, settings: Settings) -> pd.DataFrame:
@@ -532,9 +572,9 @@ def prediction_table(
     """
     friction = None if settings.fits_friction else settings.frictions[0]
     responses = responses_at(settings, simulated, settings.predicted, friction)
-    missing = [name for name in settings.predicted if name not in responses]
-    if missing:
-        raise CalibrationError(f"not enough accepted packings to predict {', '.join(missing)}")
+    shortage = _shortage(settings.predicted, responses, simulated, friction)
+    if shortage:
+        raise CalibrationError(f"not enough accepted packings for a prediction: {shortage}")
     return pd.DataFrame(
         [
             _prediction_row(name, predict(outcome.fit, responses[name]), csds[name], settings, drum, slurry_flow)

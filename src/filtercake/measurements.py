@@ -6,13 +6,14 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
+from scipy import special
 
 from filtercake.config import TO_NUMBER, Model, Name
 from filtercake.config_loading import parse, read_yaml
@@ -28,6 +29,7 @@ from filtercake.filtration import (
     fit_differential,
     fit_integral,
 )
+from filtercake.pooling import chi_square, improbable, scatter
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, FloatArray, IntArray
 
 TIME_UNITS: Final[dict[str, float]] = {"s": 1.0, "min": MINUTE, "h": HOUR}
@@ -42,8 +44,18 @@ BALANCE_RESOLUTION: Final = 0.005
 SAME_PRESSURE: Final = 0.01
 """Pressure drops that differ by less than this share are the same."""
 
+SAME_TIME: Final = 0.10
+"""Share of the larger by which volumes read at the same time may differ and are averaged, not refused; in any case
+they may by ``BALANCE_RESOLUTION`` of the final volume."""
+
+REPEATABILITY: Final = 0.05
+"""Relative standard deviation from run to run that contradicts nothing; a test's fit knows nothing of it."""
+
 SMALLEST_RELATIVE_SE: Final = 1e-6
 """Relative standard error of a resistance from data without noise."""
+
+NORMAL95: Final = float(special.ndtri(0.975))
+"""Half-width of a normal variable's 95 % interval over its standard deviation."""
 
 FIT_COLUMNS: Final = (
     "test",
@@ -216,6 +228,8 @@ class Measurements:
         Every repair, and all that is doubtful.
     files : tuple of Path
         The file itself and the tests' readings.
+    contradictions : tuple of str
+        Measurements of one distribution at one pressure that contradict each other, in sentences; warnings too.
     """
 
     title: str
@@ -224,15 +238,17 @@ class Measurements:
     measurements: tuple[Measurement, ...]
     warnings: tuple[str, ...]
     files: tuple[Path, ...] = ()
+    contradictions: tuple[str, ...] = ()
 
 
 def load_measurements(path: Path) -> Measurements:
     """Read and check a file of measurements and the tests it names, and fit the tests.
 
-    The relative error of a test's resistance is the largest of three: the standard error of the integral form's fit;
-    where other tests have the same distribution and pressure drop (within 1 %), the standard deviation of ln(alpha)
-    between them, since a fit's own error says nothing of what differs from run to run; and, where integral and
-    differential form disagree by more than their intervals, the difference of their ln(alpha).
+    The relative error of a test's resistance is the standard error of the integral form's fit or, where integral and
+    differential form disagree by more than their intervals, the difference of their ln(alpha) if that is larger; that
+    of a value given directly is the one stated. Where other measurements, tests or values, have the same distribution
+    and pressure drop (within 1 %), the scatter of ln(alpha) between them is added, since a fit's own error says
+    nothing of what differs from run to run (see :func:`filtercake.pooling.scatter`).
 
     Parameters
     ----------
@@ -259,9 +275,12 @@ def load_measurements(path: Path) -> Measurements:
         raise ConfigError(problems)
     files = (path, *(path.parent / entry.file for entry in model.tests))
     sources = [f"{entry.file} (integral form)" for entry in model.tests]
-    measured = [*_of_tests(tests, fits, sources), *_of_values(model.resistances, [test.name for test in tests])]
-    warnings = [f"{path}: {text}" for test, fit in zip(tests, fits, strict=True) for text in _doubts(test, fit)]
-    return Measurements(model.title, tuple(tests), tuple(fits), tuple(measured), tuple(warnings), files)
+    alone = [*_of_tests(tests, fits, sources), *_of_values(model.resistances, [test.name for test in tests])]
+    measured = tuple(_with_scatter(alone))
+    contradictions = tuple(_contradictions(alone, [test.name for test in tests]))
+    doubts = [text for test, fit in zip(tests, fits, strict=True) for text in _doubts(test, fit)]
+    warnings = tuple(f"{path}: {text}" for text in (*doubts, *contradictions))
+    return Measurements(model.title, tuple(tests), tuple(fits), measured, warnings, files, contradictions)
 
 
 def compressibility_by_csd(measurements: Measurements) -> dict[str, CompressibilityFit]:
@@ -281,6 +300,36 @@ def compressibility_by_csd(measurements: Measurements) -> dict[str, Compressibil
             errors = [entry.relative_se for entry in entries]
             fits[csd] = compressibility(pressure, [entry.resistance for entry in entries], errors)
     return fits
+
+
+def pressure_effects(measurements: Measurements) -> dict[str, str]:
+    """Say by distribution, in a sentence, where the resistance changes with pressure beyond its errors.
+
+    Raises
+    ------
+    FiltrationError
+        As :func:`filtercake.filtration.compressibility`.
+    """
+    pressed = with_pressure(measurements)
+    found = {}
+    for csd, fit in compressibility_by_csd(measurements).items():
+        half = _exponent_limit(fit, pressed[csd])
+        if abs(fit.exponent) > half:
+            pressures = [(entry.pressure_drop or math.nan) / KILOPASCAL for entry in pressed[csd]]
+            found[csd] = (
+                f"the resistance of {csd} {'rises' if fit.exponent > 0.0 else 'falls'} with pressure from "
+                f"{min(pressures):g} to {max(pressures):g} kPa (exponent {fit.exponent:.2g} ± {half:.1g})"
+            )
+    return found
+
+
+def _exponent_limit(fit: CompressibilityFit, entries: Sequence[Measurement]) -> float:
+    """Half-width of the exponent's 95 % interval; of two points' by their own errors."""
+    if math.isfinite(fit.exponent_ci95):
+        return fit.exponent_ci95
+    one, other = entries
+    apart = abs(math.log((one.pressure_drop or math.nan) / (other.pressure_drop or math.nan)))
+    return NORMAL95 * math.hypot(one.relative_se, other.relative_se) / apart
 
 
 def with_pressure(measurements: Measurements) -> dict[str, list[Measurement]]:
@@ -352,8 +401,9 @@ def read_test(path: Path) -> Readings:
     Columns are separated by tabs, semicolons or commas; their names and units stand in one line (``time_s,volume_mL``,
     ``t [s];V [L]``), other columns are ignored. Blank lines and lines that begin with # are skipped. Repairs, each with
     a note: lines of text above the columns' names are skipped; decimal commas are read where the separator is no comma;
-    volumes read at the same time are averaged; a volume below an earlier one is left out if it falls by at most
-    ``BALANCE_RESOLUTION`` of the largest; readings without time or volume are left out (the first one silently).
+    volumes read at the same time are averaged if they hardly differ (``SAME_TIME``); a volume below an earlier one is
+    left out if it falls by at most ``BALANCE_RESOLUTION`` of the largest; readings without time or volume are left out
+    (the first one silently).
 
     Parameters
     ----------
@@ -552,10 +602,28 @@ def _merged(path: Path, rows: _Rows) -> tuple[_Rows, list[str]]:
     time, first, where, count = np.unique(rows.time, return_index=True, return_inverse=True, return_counts=True)
     if time.size == rows.time.size:
         return rows, []
+    _require_alike(path, rows)
     volume = np.bincount(where, weights=rows.volume) / count
     again = rows.line[np.concatenate([[False], np.diff(rows.time) == 0.0])]
     note = f"{_lines_text(again)}: read at the same time as the line before, volumes averaged"
     return _Rows(rows.line[first], time, volume), [note]
+
+
+def _require_alike(path: Path, rows: _Rows) -> None:
+    """Refuse volumes of one time that differ too much; of time zero all are left out later on."""
+    largest = pd.Series(rows.volume).groupby(rows.time).transform("max").to_numpy(np.float64)
+    allowed = np.maximum(SAME_TIME * largest, BALANCE_RESOLUTION * rows.volume.max())
+    apart = (rows.time > 0.0) & (largest - rows.volume > allowed)
+    if apart.any():
+        k = int(np.argmax(apart))
+        same = np.flatnonzero(rows.time == rows.time[k])
+        other = same[np.argmax(rows.volume[same])]
+        one, more = (rows.volume[i] / VOLUME_UNITS["mL"] for i in (k, other))
+        raise FiltrationError(
+            f"{path}: line {rows.line[k]}: volume = {one:.6g} mL, but {more:.6g} mL at the same time, "
+            f"{rows.time[k]:g} s, in line {rows.line[other]}: must differ by at most {100.0 * SAME_TIME:g} %, "
+            f"or {100.0 * BALANCE_RESOLUTION:g} % of the final volume"
+        )
 
 
 def _rising(path: Path, rows: _Rows) -> tuple[_Rows, list[str]]:
@@ -635,19 +703,57 @@ def _of_tests(
     tests: Sequence[FiltrationTest], fits: Sequence[BothForms], sources: Sequence[str]
 ) -> Iterator[Measurement]:
     for test, fit, source in zip(tests, fits, sources, strict=True):
-        runs = [
-            other.integral.resistance
-            for peer, other in zip(tests, fits, strict=True)
-            if peer.csd == test.csd and _same_pressure(peer.pressure_drop, test.pressure_drop)
-        ]
-        between = float(np.std(np.log(runs), ddof=1)) if len(runs) > 1 else 0.0
         apart = abs(math.log(fit.differential.resistance / fit.integral.resistance)) if disagreement(*fit) else 0.0
-        own = fit.integral.resistance_se / fit.integral.resistance
-        error = max(own, between, apart, SMALLEST_RELATIVE_SE)
+        error = max(fit.integral.resistance_se / fit.integral.resistance, apart, SMALLEST_RELATIVE_SE)
         yield Measurement(test.name, test.csd, fit.integral.resistance, error, test.pressure_drop, source)
 
 
-def _same_pressure(one: float, other: float) -> bool:
+def _with_scatter(measured: Sequence[Measurement]) -> Iterator[Measurement]:
+    """Add to each error the scatter between the measurements of the same distribution and pressure."""
+    for entry in measured:
+        peers = _peers(entry, measured)
+        added = scatter(_logs(peers), [peer.relative_se for peer in peers])
+        yield replace(entry, relative_se=math.hypot(entry.relative_se, added)) if added > 0.0 else entry
+
+
+def _contradictions(measured: Sequence[Measurement], tests: Sequence[str]) -> Iterator[str]:
+    """Say once where measurements of the same distribution and pressure differ by more than errors and runs do."""
+    said: set[tuple[str, ...]] = set()
+    for entry in measured:
+        peers = _peers(entry, measured)
+        names = tuple(peer.name for peer in peers)
+        errors = [max(peer.relative_se, REPEATABILITY if peer.name in tests else 0.0) for peer in peers]
+        squares = chi_square(_logs(peers), errors)
+        if names in said or not improbable(squares, len(peers) - 1):
+            continue
+        said.add(names)
+        added = scatter(_logs(peers), [peer.relative_se for peer in peers])
+        pressure = (entry.pressure_drop or math.nan) / KILOPASCAL
+        yield (
+            f"the measurements of {entry.csd} at {pressure:g} kPa contradict each other ({', '.join(names)}; "
+            f"chi-square {squares:.1f} for {len(peers)} measurements): a scatter of {100.0 * added:.0f} % is added to "
+            "the error of each"
+        )
+
+
+def _peers(entry: Measurement, measured: Sequence[Measurement]) -> list[Measurement]:
+    """Measurements of the same distribution and pressure, itself among them; itself alone without a pressure."""
+    own = entry.pressure_drop
+    if own is None:
+        return [entry]
+    return [
+        peer
+        for peer in measured
+        if peer.csd == entry.csd and peer.pressure_drop is not None and same_pressure(peer.pressure_drop, own)
+    ]
+
+
+def _logs(measured: Sequence[Measurement]) -> list[float]:
+    return [math.log(entry.resistance) for entry in measured]
+
+
+def same_pressure(one: float, other: float) -> bool:
+    """Whether two pressure drops are the same within ``SAME_PRESSURE``."""
     return max(one, other) <= (1.0 + SAME_PRESSURE) * min(one, other)
 
 

@@ -140,7 +140,7 @@ class TestFit:
     def test_errors(self) -> None:
         with pytest.raises(CalibrationError, match="no measurement"):
             calibrate([], {})
-        with pytest.raises(CalibrationError, match="no packings of other"):
+        with pytest.raises(CalibrationError, match="not enough packings of other"):
             calibrate([Observation("a", "other", 22.0, 0.1)], {"one": response(0)})
         with pytest.raises(CalibrationError, match="at least 3"):
             Response((COHESION,), VALUES[:2, None], [np.ones(3)] * 2)
@@ -206,10 +206,86 @@ class TestFindings:
         assert "prefer a friction of 0 to 0.05" in finding.text
         (other,) = compare_friction(dict(reversed(fits.items())))
         assert "prefer a friction of 0 to 0.05" in other.text
-        (same,) = compare_friction({0.0: fits[0.0], 0.05: fits[0.0]})
         assert len(compare_friction({0.0: fits[0.0], 0.05: fits[0.05], 0.3: fits[0.05]})) == 2
-        assert "do not tell" in same.text
         assert compare_friction({0.0: fits[0.0]}) == ()
+
+    @pytest.mark.parametrize("csds", [CSDS, {"one": 0.0}], ids=["three", "one"])
+    def test_a_friction_does_not_win_by_more_packings(self, csds: dict[str, float]) -> None:
+        """Same cakes at both frictions, but one is packed ten times as often."""
+        observations = measured(0, 45.0, csds, error=0.002)
+
+        def fit(replicates: int) -> Calibration:
+            either = SPREAD * np.array([-1.0, 1.0] * (replicates // 2))  # their mean is the law exactly
+            return calibrate(
+                observations,
+                {
+                    name: Response((COHESION,), VALUES[:, None], [law(value, offset) + either for value in VALUES])
+                    for name, offset in csds.items()
+                },
+            )
+
+        few, many = fit(4), fit(40)
+        variances = [found.packed_variance + found.measured_variance for found in (few, many)]
+        # the ratio of the likelihoods would prefer it
+        assert np.sum(np.log(variances[0] / variances[1])) > len(csds) * 3.84 / 3.0
+        for fits in ({0.0: many, 0.05: few}, {0.0: few, 0.05: many}):
+            (finding,) = compare_friction(fits)
+            assert "do not tell a friction of 0.05 from 0" in finding.text
+            assert ("a cohesion makes up for either" in finding.text) == (len(csds) == 1)
+
+    def test_the_number_that_decides_is_said(self) -> None:
+        right = fitted(1)
+        # the larger of both packings' variances counts, whichever fit it belongs to
+        errors = right.measured_variance + 4.0 * right.packed_variance
+        squares = float(np.sum(right.residual**2 / errors))
+        for more, said in ((3.0, "do not tell"), (5.0, "prefer a friction of 0 to 0.05")):
+            shift = np.sqrt(errors * (right.residual**2 / errors + more / 3.0))
+            vague = replace(right, residual=shift, packed_variance=4.0 * right.packed_variance)
+            (finding,) = compare_friction({0.0: right, 0.05: vague})
+            assert said in finding.text
+            assert f"chi-square {squares + more:.1f} with 0.05 and {squares:.1f} with 0; " in finding.text
+            assert "it takes a difference of 3.8 to tell them apart" in finding.text
+
+    def test_frictions_that_both_fail_are_hard_to_tell_apart(self) -> None:
+        """Where the errors are known from the distributions alone, seven times the squares say nothing."""
+        bad = replace(fitted(1), discrepancy=0.2)
+        worse = replace(bad, residual=np.array([0.6, -0.4, 0.4]), discrepancy=0.3)
+        bad = replace(bad, residual=np.array([0.2, -0.2, 0.1]))
+        (finding,) = compare_friction({0.0: bad, 0.05: worse})
+        assert "do not tell" in finding.text
+        (finding,) = compare_friction({0.0: bad, 0.05: replace(worse, residual=np.array([2.0, -2.0, 1.0]))})
+        assert "prefer a friction of 0 to 0.05" in finding.text
+
+
+class TestContradictions:
+    """Measurements of one distribution that ask for different cohesions."""
+
+    def fit(self, *wanted: float, error: float = 0.01) -> Calibration:
+        observations = [Observation(f"{k}", "one", float(law(s)), error) for k, s in enumerate(wanted)]
+        return calibrate(observations, {"one": response(3)})
+
+    def test_are_said_and_widen_the_interval_over_both(self) -> None:
+        found = self.fit(30.0, 80.0)
+        (finding,) = (finding for finding in found.findings if finding.kind == "contradiction")
+        assert "the 2 measurements of one contradict each other" in finding.text
+        apart = float(law(30.0) - law(80.0))
+        assert f"chi-square {apart**2 / (2 * 0.01**2):.1f} with 1 degree of freedom" in finding.text
+        assert f"a scatter of {100 * apart / math.sqrt(2.0):.0f} %" in finding.text
+        (estimate,) = found.estimates
+        assert estimate.low < 35.0 and estimate.high > 75.0
+
+    def test_within_the_errors_are_none(self) -> None:
+        assert "contradiction" not in kinds(self.fit(50.0, 51.0))
+        # 0.0175 per kJ/m3 at most: five apart is nothing at 5 %
+        assert "contradiction" not in kinds(self.fit(50.0, 55.0, error=0.05))
+        assert "contradiction" in kinds(self.fit(50.0, 55.0, error=0.005))
+
+    def test_a_precise_one_is_not_believed_alone(self) -> None:
+        """With the scatter in the weights, one of 1 % does not outvote four of 3 % that agree with each other."""
+        observations = [Observation(f"{k}", "one", float(law(60.0)), 0.03) for k in range(4)]
+        observations.append(Observation("odd", "one", float(law(30.0)), 0.01))
+        (estimate,) = calibrate(observations, {"one": response(3)}).estimates
+        assert estimate.high > 60.0 and estimate.value > 45.0
 
 
 class TestUse:

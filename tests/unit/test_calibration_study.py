@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from filtercake import calibration_study as study
-from filtercake.calibration import Observation, Parameter
+from filtercake.calibration import Finding, Observation, Parameter, pooled
 from filtercake.calibration_study import BATCHES, Candidate, Settings, Task, choose_round, conclude
 from filtercake.csd import CrystalSizeDistribution, mixture
 from filtercake.drum_filter import DrumFilter, area
@@ -157,8 +157,67 @@ class TestOutcome:
         outcome = conclude(chosen, OBSERVATIONS, table)
         assert outcome.responses["fine", 0.0].points.shape == (study.COARSE - 1, 1)
         assert outcome.fit.estimates[0].low < TRUTH < outcome.fit.estimates[0].high
-        with pytest.raises(CalibrationError, match="no packings of fine"):
+        with pytest.raises(CalibrationError, match="fine has them at 0 of 0 points"):
             conclude(chosen, OBSERVATIONS, table[table["csd"] != "fine"])
+
+    def test_too_few_packings_are_counted(self) -> None:
+        """Two of six points are neither enough nor none."""
+        everything = candidates()
+        first = choose_round(0, settings(), everything, [], OBSERVATIONS, None)
+        table = packed([c for c in everything if c.point.name in first.points])
+        bad = (table["csd"] == "fine") & (table["cohesion_kJ_m3"] > 30.0)
+        table.loc[bad, "status"] = "failed"
+        for act in (conclude, study.fit_main):
+            with pytest.raises(CalibrationError) as error:
+                act(settings(), OBSERVATIONS, table)
+            assert str(error.value) == (
+                "not enough accepted packings for a fit: fine has them at 2 of 6 points; at least 3 are needed, one of "
+                "them with two packings"
+            )
+
+    def test_a_rival_with_too_few_packings_is_said(self) -> None:
+        chosen = settings(frictions=(0.0, 0.05))
+        _, table = self.outcome(chosen)
+        bad = (table["friction"] == 0.05) & (table["csd"] == "coarse") & (table["cohesion_kJ_m3"] < 90.0)
+        table.loc[bad, "status"] = "failed"
+        outcome = conclude(chosen, OBSERVATIONS, table)
+        assert set(outcome.rivals) == {0.0} and outcome.fit.estimates[0].low < TRUTH < outcome.fit.estimates[0].high
+        (said,) = (finding.text for finding in outcome.findings if finding.kind == "friction")
+        assert said.startswith(
+            "a friction of 0.05 is not compared, for want of accepted packings: coarse has them at 1 "
+        )
+        assert "of 6 points" in said and "fine" not in said
+
+    def test_one_distribution_cannot_test_the_friction(self) -> None:
+        alone = settings(measured=("fine",))
+        outcome = conclude(alone, OBSERVATIONS[:1], self.outcome()[1])
+        (said,) = (finding.text for finding in outcome.findings if finding.kind == "friction")
+        assert "one measured distribution cannot test the friction taken, 0" in said
+
+    def test_one_distribution_and_two_parameters_are_reported_as_confounded(self) -> None:
+        chosen = settings(
+            parameters=(Parameter("cohesion_kJ_m3", 0.0, 100.0), Parameter("friction", 0.0, 0.1)),
+            frictions=(0.0, 0.05, 0.1),
+            measured=("fine",),
+        )
+        truth = OBSERVATIONS[:1]
+        first = choose_round(0, chosen, candidates(chosen.frictions), [], truth, None)
+        table = packed([c for c in candidates(chosen.frictions) if c.point.name in first.points])
+        record = study.summary(conclude(chosen, truth, table), chosen, "")
+        said = {finding["kind"]: finding["text"] for finding in record["findings"]}
+        assert said["confounded"] == (
+            "1 measured distribution cannot determine 2 parameters: cohesion energy density and coefficient of "
+            "friction trade off against each other; measure more distributions or fix one of them"
+        )
+        # the interval of the cohesion is not that of a friction known to be the best
+        found = record["parameters"]["cohesion_kJ_m3"]
+        fixed = conclude(settings(measured=("fine",)), truth, table).fit.estimates[0]
+        assert found["high"] - found["low"] > 2.0 * 2.0 * fixed.half_width
+
+    def test_doubts_of_the_measurements_come_first(self) -> None:
+        doubt = Finding("pressure", "the resistance rises with pressure")
+        outcome = conclude(settings(doubts=(doubt,)), OBSERVATIONS, self.outcome()[1])
+        assert study.summary(outcome, settings(), "")["findings"][0] == {"kind": "pressure", "text": doubt.text}
 
     def test_rivals_are_compared(self) -> None:
         chosen = settings(frictions=(0.0, 0.05))
@@ -203,6 +262,20 @@ class TestOutcome:
         exact = [law("fine", s, 0.0) for s in fine["cohesion_kJ_m3"]]
         assert np.abs(np.log(fine["resistance_m_kg"]) - exact).max() < 0.08
 
+    def test_the_parity_table_has_the_errors_of_the_fit(self) -> None:
+        """Measurements that contradict each other carry their scatter; figures average them with it."""
+        twice = [*OBSERVATIONS, Observation("again", "fine", law("fine", 80.0, 0.0), 0.01)]
+        _, table = self.outcome()
+        outcome = conclude(settings(), twice, table)
+        assert "contradiction" in {finding.kind for finding in outcome.findings}
+        parity = study.parity_table(outcome, settings(), twice)
+        own = parity[parity["csd"] == "fine"]
+        scatter = pooled(twice)["fine"].scatter
+        assert own["relative_uncertainty"].tolist() == pytest.approx([math.hypot(scatter, e) for e in (0.02, 0.01)])
+        assert parity.loc[1, "relative_uncertainty"] == 0.02
+        mean = np.average(np.log(own["measured_m_kg"]), weights=own["relative_uncertainty"] ** -2)
+        assert np.log(own["left_out_m_kg"]).tolist() == pytest.approx([mean + outcome.left_out["fine"]] * 2)
+
 
 class TestPrediction:
     def test_of_a_distribution_never_tested(self) -> None:
@@ -232,7 +305,7 @@ class TestPrediction:
 
     def test_needs_packings(self) -> None:
         outcome, table = TestOutcome().outcome()
-        with pytest.raises(CalibrationError, match="to predict new"):
+        with pytest.raises(CalibrationError, match="for a prediction: new has them at 0 of 0"):
             study.prediction_table(outcome, settings(), table, CSDS)
 
 
@@ -240,10 +313,10 @@ def test_settings_and_task_survive_being_params() -> None:
     import json
 
     whole = {
-        "settings": settings().as_dict(),
+        "settings": settings(doubts=(Finding("pressure", "said"),)).as_dict(),
         "observations": [vars(item) for item in OBSERVATIONS],
         "candidates": [{"point": c.point.as_dict(), "batch": c.batch} for c in candidates()[:3]],
     }
     task = Task.from_params(json.loads(json.dumps(whole)))
-    assert task.settings == settings() and list(task.observations) == OBSERVATIONS
+    assert task.settings == settings(doubts=(Finding("pressure", "said"),)) and list(task.observations) == OBSERVATIONS
     assert list(task.candidates) == candidates()[:3]

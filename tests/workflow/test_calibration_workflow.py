@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 from conftest import Checkout, copy_project
+
+from filtercake.calibration import Parameter
+from filtercake.calibration_config import load_calibration, settings_of
+from filtercake.calibration_study import conclude, summary
 
 TINY = "config/test/calibration/tiny.yaml"
 
@@ -32,7 +38,14 @@ def test_every_product_is_there_and_consistent(calibrated: Checkout) -> None:
     parity = pd.read_csv(folder / "tables" / "parity.csv")
     assert parity["measurement"].tolist() == ["tiny_test", "bimodal"]
     assert parity["measured_m_kg"].iloc[0] == pytest.approx(1.4e9, rel=0.02)
-    assert (parity["modelled_m_kg"] / parity["measured_m_kg"]).between(0.5, 2.0).all()
+    # one parameter fits one distribution exactly: the mean of its measurements, by weight
+    weight = parity["relative_uncertainty"] ** -2
+    mean = np.average(np.log(parity["measured_m_kg"]), weights=weight)
+    error = np.hypot(parity["packings_relative_error"][0], weight.sum() ** -0.5)
+    assert (np.abs(np.log(parity["modelled_m_kg"]) - mean) < 0.2 * error).all()
+    assert record["chi_square"] < 0.04 and record["degrees_of_freedom"] == 0
+    (said,) = (finding["text"] for finding in record["findings"] if finding["kind"] == "friction")
+    assert "do not tell a friction of 0.1 from 0, as a cohesion makes up for either" in said
     predictions = pd.read_csv(folder / "tables" / "predictions.csv")
     assert predictions["csd"].tolist() == ["from_file"]
     assert (predictions["resistance_low_m_kg"] < predictions["resistance_m_kg"]).all()
@@ -42,6 +55,18 @@ def test_every_product_is_there_and_consistent(calibrated: Checkout) -> None:
         assert (folder / "figures" / f"calibration_{figure}.png").stat().st_size > 10_000
     assert (folder / "figures" / "filtration_fits.pdf").exists()
     assert (folder / "figures" / "compressibility.pdf").exists()
+
+
+def test_two_parameters_of_one_distribution_are_reported_as_confounded(calibrated: Checkout) -> None:
+    """The packings of a finished calibration, fitted for the friction too."""
+    folder = calibrated.root / "results" / "calibration_tiny"
+    simulated = pd.read_csv(folder / "tables" / "simulated.csv")
+    calibration = load_calibration(calibrated.root / TINY, calibrated.root / "config" / "studies")
+    fitted = replace(settings_of(calibration), parameters=(*calibration.parameters, Parameter("friction", 0.0, 0.1)))
+    record = summary(conclude(fitted, calibration.observations, simulated), fitted, "")
+    assert "1 measured distribution cannot determine 2 parameters" in " ".join(
+        finding["text"] for finding in record["findings"] if finding["kind"] == "confounded"
+    )
 
 
 def test_rounds_follow_each_other(calibrated: Checkout) -> None:

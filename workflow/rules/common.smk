@@ -9,7 +9,6 @@ from filtercake import console, engine_choice
 from filtercake.calibration_config import (
     candidates as calibration_candidates,
     load_calibrations,
-    observations_of,
     settings_of,
 )
 from filtercake.config_loading import find_studies, load_studies, load_workflow

@@ -79,7 +79,7 @@ def calibration_params(wildcards):
     calibration = calibration_of(wildcards)
     return {
         "settings": settings_of(calibration).as_dict(),
-        "observations": [vars(item) for item in observations_of(calibration)],
+        "observations": [vars(item) for item in calibration.observations],
         "candidates": [
             {"point": item.point.as_dict(), "batch": item.batch}
             for item in CANDIDATES[wildcards.calibration].values()
