@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -18,13 +20,19 @@ CASES = {
     "alum": "Alum 15 min, N = 4000",
     "alum_wide": "Alum 15 min, N = 20 000",
 }
-AXES = ("time step", "spheres", "stop tolerance", "skin", "softer contacts", "truncation", "engine")
+AXES = ("time step", "spheres", "stop tolerance", "skin", "engine", "softer contacts", "truncation")
 """What a variant differs in, in the order of colours."""
 AS_PUBLISHED = "as published"
 ANALYTIC = "analytic"
 INTERIOR, COUNT = "interior slab", "count"
 REPLICATES = (1, 2, 4, 8, 16, 32)
 LEAST_ERROR = 1e-4
+STAR: dict[str, Any] = {
+    "markersize": 12,
+    "markerfacecolor": "#F0E442",
+    "markeredgecolor": style.INK,
+    "linestyle": "none",
+}
 
 
 def draw(table: pd.DataFrame, references: pd.DataFrame) -> Figure:
@@ -105,7 +113,7 @@ def _default(axes: Axes, rows: pd.DataFrame, noise: float) -> None:
     counts = np.array(REPLICATES, dtype=np.float64)
     error = np.maximum(np.sqrt(bias**2 + float(row["sd"]) ** 2 / counts), min(noise, 1.0) * 0.5)
     axes.plot(float(row["seconds"]) * counts, error, "-", color=style.INK, linewidth=0.9, zorder=1)
-    axes.plot([row["seconds"]], [row["error"]], "*", color="#D55E00", markersize=11, label="default", zorder=6)
+    axes.plot([row["seconds"]], [row["error"]], "*", **STAR, label="default", zorder=6)
 
 
 def _shown(error: pd.Series[float]) -> FloatArray:
