@@ -174,7 +174,7 @@ def _time_step_cohesion() -> Iterable[Case]:
     steps = (0.12, 0.36, 0.5, 0.7, 0.9, 1.1, 2.0)
     yield from _grid(*names, steps, "cohesion_kJ_m3", (0.0, 50.0, 100.0, 200.0, 500.0))
     names = ("time_step_cohesion", Liggghts.name, "time_step")
-    yield from _grid(*names, (0.12, 0.36, 0.7, 1.1, 2.0), "cohesion_kJ_m3", (0.0, 50.0, 200.0, 500.0))
+    yield from _grid(*names, (0.12, 0.5, 0.7, 1.1, 2.0), "cohesion_kJ_m3", (0.0, 50.0, 200.0, 500.0))
 
 
 def _time_step_friction() -> Iterable[Case]:
@@ -196,8 +196,8 @@ def _modulus_cohesion() -> Iterable[Case]:
 
 def _restitution_time_step() -> Iterable[Case]:
     names = ("restitution_time_step", Embedded.name, "restitution")
-    yield from _grid(*names, (0.01, 0.1, 0.3, 0.9, 0.99), "time_step", (0.2, 0.36, 0.7))
-    yield from _grid("restitution_time_step", Liggghts.name, "restitution", (0.01, 0.99), "time_step", (0.36,))
+    yield from _grid(*names, (0.01, 0.1, 0.3, 0.9, 0.99), "time_step", (0.2, 0.36, 0.5, 0.7))
+    yield from _grid("restitution_time_step", Liggghts.name, "restitution", (0.01, 0.99), "time_step", (0.5,))
 
 
 def _size_ratio_skin() -> Iterable[Case]:
