@@ -60,7 +60,7 @@ TO_WHOLE = BeforeValidator(_whole)
 Number = Annotated[float, Field(allow_inf_nan=False), TO_NUMBER]
 Name = Annotated[str, BeforeValidator(_name)]
 
-Density = Annotated[float, Field(gt=0, le=25_000, allow_inf_nan=False), TO_NUMBER]
+Density = Annotated[float, Field(gt=0, le=fence.LARGEST_DENSITY, allow_inf_nan=False), TO_NUMBER]
 YoungsModulus = Annotated[float, Field(ge=0.5, le=100_000, allow_inf_nan=False), TO_NUMBER]
 PoissonRatio = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER]
 Restitution = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER]

@@ -340,7 +340,11 @@ def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str
                 modulus, poisson = value["youngs_modulus_MPa"] * MEGAPASCAL, value["poisson_ratio"]
                 rayleigh = contact.rayleigh_time_step(0.5 * smallest, material.density, modulus, poisson)
                 step = packing.time_step(rayleigh, value["friction"])
-                keys = {"cohesion": where["cohesion_kJ_m3"], "time_step": _time_step_key(packing, step / rayleigh)}
+                keys = {
+                    "cohesion": where["cohesion_kJ_m3"],
+                    "time_step": _time_step_key(packing, step / rayleigh),
+                    "density": ("material.density_kg_m3", material.density),
+                }
                 yield (
                     keys,
                     fence.Numbers(

@@ -20,6 +20,8 @@ FRICTIONLESS_TIME_STEP: Final = 0.5
 """Default time step over the Rayleigh step at mu = 0."""
 FRICTIONAL_TIME_STEP: Final = 0.2
 """The same at mu > 0: rotation on several tangential springs is the fastest motion, and limits the step."""
+LARGEST_DENSITY: Final = 25_000.0
+"""Crystal density, kg/m3, over that of any solid: heavier spheres strike soft contacts too hard."""
 LARGEST_TIME_STEP: Final = 1.0
 """Time step over the Rayleigh step from which beds explode: refused."""
 LARGEST_RELATIVE_OVERLAP: Final = 0.035
@@ -68,7 +70,7 @@ class Finding:
 
     Attributes
     ----------
-    key : {"cohesion", "time_step"}
+    key : {"cohesion", "time_step", "density"}
         Which number it is about.
     text : str
         What is wrong, with the number that is allowed and the page that shows why.
@@ -93,6 +95,8 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
             f"E = {scene.youngs_modulus / MEGAPASCAL:g} MPa, nu = {scene.poisson_ratio:g}: above it, contacts overlap "
             f"by more than {LARGEST_RELATIVE_OVERLAP:.1%} of the diameter ({PAGE}); use a larger youngs_modulus_MPa",
         )
+    if scene.density > LARGEST_DENSITY:
+        yield Finding("density", f"must be at most {LARGEST_DENSITY:g} kg/m3 ({PAGE})")
     if scene.time_step >= LARGEST_TIME_STEP * scene.rayleigh:
         yield Finding(
             "time_step",

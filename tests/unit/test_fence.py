@@ -38,6 +38,7 @@ def test_defaults_are_inside() -> None:
     [
         ({"cohesion": 250e3}, "cohesion", "must be at most 206 kJ/m3 at E = 5 MPa, nu = 0.2"),
         ({"youngs_modulus": 1e6}, "cohesion", "must be at most 41 kJ/m3 at E = 1 MPa"),
+        ({"density": 118e3, "time_step": 3e-6}, "density", "at most 25000 kg/m3"),
         ({"time_step": 1.01 * RAYLEIGH}, "time_step", "Rayleigh time step 0.8223 us"),
     ],
 )
