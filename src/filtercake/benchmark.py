@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.csd import CrystalSizeDistribution
-from filtercake.errors import EngineError, EngineMissing, PackingRejected
+from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
 from filtercake.packing.engines import Engine, get_engine
 from filtercake.packing.engines.embedded import Embedded
@@ -125,7 +125,7 @@ def settle_timed(each: Contender, csd: CrystalSizeDistribution, replicate: int) 
             settled = settle(each.spec, csd, replicate, Path(folder), engine=each.engine)
         except EngineMissing:
             raise
-        except EngineError as error:
+        except (CloudError, EngineError) as error:
             nothing = dict.fromkeys(POROSITIES, math.nan)
             seconds = time.monotonic() - started
             return {"replicate": replicate, "wall_s": seconds, "steps": 0, "status": str(error), **nothing}
