@@ -77,6 +77,14 @@ def test_packings_that_were_not_accepted_do_not_count() -> None:
     assert row["porosity"] == pytest.approx(0.3505)
 
 
+def test_a_variant_of_which_nothing_was_accepted_is_told() -> None:
+    table = errors("pmma", packings([0.9, 0.9], status="not settled"), REFERENCE)
+    (row,) = table.to_dict("records")
+    assert (row["n"], row["n_failed"]) == (0, 2)
+    assert math.isnan(row["error"])
+    assert not on_front(table).any()
+
+
 def test_the_front() -> None:
     points = pd.DataFrame({"seconds": [1.0, 2.0, 0.5, 4.0, 1.1], "error": [1.0, 0.5, 3.0, 0.7, 0.95]})
     # the fourth is beaten by the second; the last is not better than the first by more than can be measured
