@@ -1,4 +1,4 @@
-"""The command line: ``filtercake csd``, ``porosity``, ``resistance`` and ``filter-area`` on files and numbers."""
+"""The command line: the steps of a study on files and numbers, without Snakemake."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from filtercake import __version__, api
+from filtercake import __version__, api, bed
 from filtercake import cli_options as words
+from filtercake.config import Material, Packing
 from filtercake.csd import to_table
 from filtercake.errors import FiltercakeError
 from filtercake.packing.result import publish
@@ -33,6 +34,7 @@ Command = Callable[[argparse.Namespace], int]
 
 _EXAMPLES = {
     "csd": "filtercake csd --kinetics ammonium_alum --residence-time-min 15 --slurry-density-kg-m3 200",
+    "pack": "filtercake pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --porosity-interval 0.003 --output packing",
     "resistance": "filtercake resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5",
     "porosity": "filtercake porosity packing/r0.npz --profile",
     "filter-area": (
@@ -94,6 +96,7 @@ def build_parser() -> words.Parser:
     parser.add_argument("--version", action="version", version=f"filtercake {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     _add_csd(commands)
+    _add_pack(commands)
     _add_porosity(commands)
     _add_resistance(commands)
     _add_filter_area(commands)
@@ -114,6 +117,23 @@ def _add_csd(commands: Any) -> None:
     parser = _command(commands, "csd", _run_csd, text)
     words.add_source(parser)
     parser.add_argument("--output", metavar="CSV", help="write the classes, full and as packed, to this file")
+
+
+def _add_pack(commands: Any) -> None:
+    text = (
+        "Pack spheres of a size distribution; print porosity and specific cake resistance (m/kg) with 95 % intervals."
+    )
+    parser = _command(commands, "pack", _run_pack, text)
+    words.add_source(parser)
+    words.add_model(parser.add_argument_group("crystals"), Material)
+    words.add_model(parser.add_argument_group("packing"), Packing)
+    parser.add_argument(
+        "--output",
+        metavar="FOLDER",
+        default="packing",
+        help="receives the packings, r0.npz and r0.json and so on; those of an earlier call with the same options are "
+        "kept. Default: packing",
+    )
 
 
 def _add_porosity(commands: Any) -> None:
@@ -172,6 +192,39 @@ def _run_csd(options: argparse.Namespace) -> int:
             ("packed: sum of x/d2", values["packed_sum_x_over_d2_1_m2"], "1/m2"),
         ]
     )
+
+
+def _run_pack(options: argparse.Namespace) -> int:
+    source = api.distribution(**words.source(options))
+    asked = words.given(options, (*Material.model_fields, *Packing.model_fields))
+    found = bed.pack(source, options.output, say=_say, **asked)
+    for warning in found.warnings:
+        _say(f"warning: {words.with_flags(warning, vars(options))}")
+    summary, status = found.summary, 0 if found.files else FAILED
+    if options.json:
+        _print_json({**summary, "files": [str(path) for path in found.files], "failures": list(found.failures)})
+        return status
+    if not found.files:
+        return status
+    _print_lines(
+        [
+            ("porosity, interior", summary["porosity"], _interval(summary["porosity_ci95"], "")),
+            ("porosity as published", summary["porosity_as_published"], ""),
+            ("resistance, eq. 3", summary["resistance_m_kg"], _interval(summary["resistance_ci95_m_kg"], "m/kg")),
+            ("resistance, Carman", summary["resistance_sauter_m_kg"], "m/kg"),
+            ("packings", summary["n"], f"of {summary['particles']} spheres by {summary['engine']}"),
+        ]
+    )
+    print(f"packings are in {options.output}")
+    return status
+
+
+def _interval(half: float | None, unit: str) -> str:
+    return unit if half is None else f"+- {_number(half)} {unit} (95 %)".replace("  ", " ")
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 def _run_porosity(options: argparse.Namespace) -> int:

@@ -26,6 +26,7 @@ SOURCE_OPTIONS = ("file", "mixture", *(name for _, names in SOURCE_FIELDS for na
 SAID_OTHERWISE = {
     "residence_time_min": "Residence time of the crystallizer, min; goes with --kinetics.",
     "kinetics": "Crystallizer's product: a preset (ammonium_alum, potassium_nitrate), or a name in --kinetics-file.",
+    "slurry_density_kg_m3": "Crystals in the slurry, kg/m3 (= g/L); goes with --kinetics.",
     "kinetics_file": "YAML with kinetics of your own.",
 }
 """Help where the model speaks of a study file."""
@@ -54,14 +55,14 @@ def flag(name: str) -> str:
     return "FILE" if name == "file" else "--" + name.replace("_", "-")
 
 
-def add_field(group: argparse._ArgumentGroup, name: str, field: FieldInfo) -> None:
-    """Add the option of a key; its value stays text, for the model to check."""
+def add_field(group: argparse._ArgumentGroup, name: str, field: FieldInfo, text: str | None = None) -> None:
+    """Add the option of a key, with a text instead of the model's; its value stays text, for the model to check."""
     names = dict.fromkeys((flag(name), flag(name).lower()))
     if field.annotation is bool:
         group.add_argument(*names, dest=name, action="store_const", const=True, help=_escape(meaning(field)))
         return
     range_ = allowed(field).replace("`", "")
-    group.add_argument(*names, dest=name, metavar=_metavar(range_), help=_escape(_help(name, field, range_)))
+    group.add_argument(*names, dest=name, metavar=_metavar(range_), help=_escape(_help(name, field, range_, text)))
 
 
 def add_model(group: argparse._ArgumentGroup, model: type[BaseModel], leave_out: Iterable[str] = ()) -> None:
@@ -80,7 +81,8 @@ def add_source(parser: argparse.ArgumentParser) -> None:
     )
     for model, names in SOURCE_FIELDS:
         for name in names:
-            add_field(group, name, model.model_fields[name])
+            text = SAID_OTHERWISE.get(name)
+            add_field(group, name, model.model_fields[name], text)
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
@@ -155,16 +157,16 @@ def _pairs(text: str) -> list[tuple[str, str]]:
     return found
 
 
-def _help(name: str, field: FieldInfo, range_: str) -> str:
-    text = SAID_OTHERWISE.get(name, meaning(field))
+def _help(name: str, field: FieldInfo, range_: str, instead: str | None) -> str:
+    text = instead or meaning(field)
     if range_ == "text":
         return text
     if name in DEFAULT_OTHERWISE:
         default = f" Default: {DEFAULT_OTHERWISE[name]}."
-    elif field.is_required():
+    elif field.is_required() and instead is None:
         default = " Required."
     else:
-        default = "" if field.default is None else f" Default: {_plain(field.default)}."
+        default = "" if field.is_required() or field.default is None else f" Default: {_plain(field.default)}."
     return f"{text} Allowed: {range_}.{default}"
 
 

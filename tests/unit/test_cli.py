@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtercake import api, cli
+from filtercake import api, bed, cli
 from filtercake.cli import main
 from filtercake.errors import ConfigError, PackingRejected
+from filtercake.packing.pack import Outcome
 
 PMMA = ["--mixture", "20:0.5,50:0.5"]
 ALUM = ["--kinetics", "ammonium_alum", "--residence-time-min", "15", "--slurry-density-kg-m3", "200"]
@@ -20,7 +24,8 @@ DRUM = [
     *["--slurry-density-kg-m3", "200", "--pressure-drop-kPa", "53.33", "--submerged-fraction", "0.3"],
     *["--rotation-rate-rpm", "0.2", "--medium-resistance-1-m", "5e9"],
 ]
-COMMANDS = ["csd", "porosity", "resistance", "filter-area"]
+COMMANDS = ["csd", "pack", "porosity", "resistance", "filter-area"]
+BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
 
 Capture = pytest.CaptureFixture[str]
 
@@ -127,6 +132,75 @@ def test_help_names_units_and_an_example(command: str, capsys: Capture) -> None:
     assert f"filtercake {command}" in printed.split("example:")[1]
 
 
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of two tiny packings."""
+    folder = tmp_path_factory.mktemp("packed") / "bed"
+    assert main(["pack", *BED, "--replicates", "2", "--output", str(folder)]) == 0
+    return folder
+
+
+def test_pack_prints_what_porosity_and_resistance_find_in_its_files(packed: Path, capsys: Capture) -> None:
+    before = {path.name: path.read_bytes() for path in packed.glob("r*.npz")}
+    found = as_json(["pack", *BED, "--replicates", "2", "--output", str(packed)], capsys)
+    assert found["n"] == 2
+    assert found["engine"] == "embedded"
+    assert {path.name: path.read_bytes() for path in packed.glob("r*.npz")} == before
+    measured = as_json(["porosity", *(str(packed / f"r{k}.npz") for k in (0, 1)), "--profile"], capsys)
+    assert measured["porosity"] == pytest.approx(found["porosity"])
+    assert measured["porosity_ci95"] == pytest.approx(found["porosity_ci95"])
+    law = ["--density-kg-m3", "1180", *BED[:2]]
+    alphas = []
+    for item in measured["packings"]:  # type: ignore[attr-defined]
+        filled = sum(1.0 - row["porosity"] for row in item["profile"])
+        assert filled > 0.0
+        alphas.append(as_json(["resistance", "--porosity", str(item["porosity"]), *law], capsys)["resistance_m_kg"])
+    assert found["resistance_m_kg"] == pytest.approx(np.mean(alphas))
+    assert json.loads((packed / "summary.json").read_text())["porosity"] == found["porosity"]
+
+
+def test_the_profile_adds_up_to_the_spheres(packed: Path) -> None:
+    rows = api.profile(packed / "r0.npz")
+    packing, _ = api.load_packing(packed / "r0.npz")
+    step = 1e-6 * (rows["height_um"][1] - rows["height_um"][0])
+    solids = float((1.0 - rows["porosity"]).sum()) * step * packing.length**2
+    assert solids == pytest.approx(4.0 / 3.0 * np.pi * float((packing.radius**3).sum()))
+
+
+def test_porosity_in_words(packed: Path, capsys: Capture) -> None:
+    assert main(["porosity", str(packed / "r0.npz"), "--profile"]) == 0
+    printed = capsys.readouterr().out
+    assert "porosity, interior" in printed
+    assert "height, um" in printed
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        (["--particles", "10"], "--particles = 10: must be greater than or equal to 50"),
+        (["--cohesion-kJ-m3", "500"], "--cohesion-kJ-m3 = 500: must be at most"),
+        (["--time-step-us", "5"], "--time-step-us = 5: must be below the Rayleigh time step"),
+        (["--engine", "magic"], "--engine = magic: allowed:"),
+        (["--replicates", "2.5"], "--replicates = 2.5: must be a whole number"),
+        (["--output", "{other}"], "must be new, empty, or a folder of packings; it holds mine.txt"),
+        (["--output", "{other}/mine.txt"], "mine.txt"),
+    ],
+)
+def test_pack_refuses_in_one_line(extra: list[str], said: str, tmp_path: Path, capsys: Capture) -> None:
+    (tmp_path / "mine.txt").touch()
+    extra = [word.format(other=tmp_path) for word in extra]
+    assert said in complaint(["pack", *BED, *extra], capsys)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_bed_that_fails_has_a_reason_and_status_1(tmp_path: Path, capsys: Capture) -> None:
+    few = ["pack", "--mixture", "20:0.01,200:0.99", "--density-kg-m3", "1180", "--particles", "50"]
+    assert main([*few, "--engine", "embedded", "--replicates", "1", "--output", str(tmp_path / "x"), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (found["n"], found["n_failed"], found["porosity"]) == (0, 1, None)
+    assert "r0: " in found["failures"][0]
+
+
 def test_version(capsys: Capture) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("filtercake ")
@@ -183,9 +257,32 @@ GOOD = st.sampled_from(["0.3", "20:0.5,50:0.5", "1e8", "15", "200", "ammonium_al
 ARGUMENTS = st.lists(st.tuples(st.sampled_from(OPTIONS), GOOD | WORDS | PAIRS).map(list), max_size=8)
 
 
+@pytest.fixture(scope="module")
+def no_settling(packed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Let ``pack`` take packings that are there, whatever is asked for; gives a folder to write to."""
+    shelf = tmp_path_factory.mktemp("shelf")
+
+    def take(point: object, csd: object, folder: Path, say: object) -> list[Outcome]:
+        shutil.copytree(packed, folder, dirs_exist_ok=True)
+        return [Outcome(k, "ok", "", 1, "", 1) for k in (0, 1)]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bed, "_make", take)
+        patch.chdir(shelf)
+        yield shelf
+
+
 @given(command=st.sampled_from(COMMANDS), pairs=ARGUMENTS, more=st.lists(WORDS, max_size=2))
-def test_no_argument_makes_it_fall_over(command: str, pairs: list[list[str]], more: list[str]) -> None:
+def test_no_argument_makes_it_fall_over(
+    no_settling: Path, command: str, pairs: list[list[str]], more: list[str]
+) -> None:
     assert main([command, *more, *(word for pair in pairs for word in pair)]) in (0, 2)
+
+
+@given(pairs=ARGUMENTS)
+def test_no_option_of_pack_makes_it_fall_over(no_settling: Path, pairs: list[list[str]]) -> None:
+    given_ = [word for pair in pairs for word in pair if pair[0] not in ("--mixture", "--kinetics")]
+    assert main(["pack", *BED, *given_]) in (0, 2)
 
 
 @given(
