@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from filtercake import __version__, api, bed
+from filtercake import __version__, api, bed, export
 from filtercake import cli_options as words
 from filtercake.config import Material, Packing
 from filtercake.csd import to_table
-from filtercake.errors import FiltercakeError
+from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected
 from filtercake.packing.result import publish
 from filtercake.precision import half_width
 from filtercake.units import MICROMETRE
@@ -36,6 +36,8 @@ _EXAMPLES = {
     "csd": "filtercake csd --kinetics ammonium_alum --residence-time-min 15 --slurry-density-kg-m3 200",
     "pack": "filtercake pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --porosity-interval 0.003 --output packing",
     "resistance": "filtercake resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5",
+    "export": "filtercake export pmma pmma_50_s50_mu0_1a2b3c4d --output report",
+    "rerun": "filtercake rerun report",
     "porosity": "filtercake porosity packing/r0.npz --profile",
     "filter-area": (
         "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-density-kg-m3 200 "
@@ -100,6 +102,8 @@ def build_parser() -> words.Parser:
     _add_porosity(commands)
     _add_resistance(commands)
     _add_filter_area(commands)
+    _add_export(commands)
+    _add_rerun(commands)
     return parser
 
 
@@ -156,6 +160,24 @@ def _add_filter_area(commands: Any) -> None:
     text = "Area of a rotary drum filter (m2) for a slurry flow (m3/h), or the flow that an area can take."
     parser = _command(commands, "filter-area", _run_filter_area, text)
     words.add_model(parser.add_argument_group("filter and slurry"), api.FilterOptions)
+
+
+def _add_export(commands: Any) -> None:
+    text = "Write one packing of a study to a folder that stands alone: deck, cloud, seeds, versions, log, a README."
+    parser = _command(commands, "export", _run_export, text)
+    parser.add_argument("study", metavar="STUDY", help="name of a file in config/studies, or the path of a study file")
+    parser.add_argument("point", metavar="POINT", help="name of the point: column point of summary.csv")
+    parser.add_argument("--replicate", metavar="K", help="which packing, from 0. Default: the first that failed, or 0")
+    parser.add_argument(
+        "--results", metavar="FOLDER", default="results", help="folder of the results. Default: results"
+    )
+    parser.add_argument("--output", metavar="FOLDER", required=True, help="the new folder")
+
+
+def _add_rerun(commands: Any) -> None:
+    text = "Make an exported packing once more, and print its porosity beside the first one's."
+    parser = _command(commands, "rerun", _run_rerun, text)
+    parser.add_argument("folder", metavar="FOLDER", help="what filtercake export wrote")
 
 
 def _run_csd(options: argparse.Namespace) -> int:
@@ -283,6 +305,32 @@ def _run_filter_area(options: argparse.Namespace) -> int:
     if found.cake_thickness_mm is not None:
         lines.append(("cake thickness", found.cake_thickness_mm, "mm"))
     return _print_lines(lines)
+
+
+def _run_export(options: argparse.Namespace) -> int:
+    number = options.replicate
+    if number is not None and not (number.isascii() and number.isdigit() and len(number) < 10):
+        raise words.UsageError(f"--replicate = {number}: must be a whole number, from 0")
+    asked = None if number is None else int(number)
+    found = export.export(options.study, options.point, options.results, options.output, asked)
+    if options.json:
+        return _print_json({**asdict(found), "folder": str(found.folder)})
+    print(f"{found.point}, replicate {found.replicate} ({found.status}): {found.folder}; see README.md there")
+    return 0
+
+
+def _run_rerun(options: argparse.Namespace) -> int:
+    try:
+        found = export.rerun(options.folder)
+    except EngineMissing:
+        raise
+    except (CloudError, EngineError, PackingRejected) as error:
+        return _complain(f"the packing failed: {error}", FAILED)
+    before = export.first_porosity(options.folder)
+    if options.json:
+        return _print_json({**asdict(found), "first_porosity": before})
+    lines: list[Line] = [("porosity, interior", found.porosity, "")]
+    return _print_lines([*lines, *([("when first made", before, "")] if before is not None else [])])
 
 
 def _mean(values: list[float]) -> tuple[float, float]:
