@@ -234,7 +234,11 @@ def resistance(source: Distribution, **options: Any) -> Resistance:
     if density is None:
         raise ConfigError([_problem("density_kg_m3", "(missing)", "must be given")])
     law = (given.porosity, source.full, density, given.sphericity)
-    return Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))
+    try:
+        return Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))
+    except (ZeroDivisionError, OverflowError):
+        allowed = f"is too small to compute with, at a density of {density:g} kg/m3"
+        raise ConfigError([_problem("porosity", f"{given.porosity:g}", allowed)]) from None
 
 
 def filter_area(**options: Any) -> FilterSize:
@@ -337,6 +341,8 @@ def load_packing(npz: Path) -> tuple[Packing, PackingSpec]:
     PackingRejected
         If a file is missing, damaged, or not what was accepted.
     """
+    if not npz.name:
+        raise PackingRejected([f"{str(npz)!r} is not the name of a packing's file"])
     try:
         packing = Packing.load(npz)
     except PackingRejected as error:
@@ -379,7 +385,10 @@ def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mappin
         study["csds"] = {CSD: {**origin, **cut}}
         study["sweeps"] = [{"csd": [CSD]}]
     with np.errstate(all="ignore"):
-        loaded = check_study(study, ORIGIN)
+        try:
+            loaded = check_study(study, ORIGIN)
+        except (ZeroDivisionError, OverflowError):
+            raise ConfigError([_problem("options", "", "a number is too small or too large to compute with")]) from None
         _check_sums(loaded)
     return loaded
 

@@ -184,7 +184,10 @@ def _run_csd(options: argparse.Namespace) -> int:
     found = api.distribution(**words.source(options))
     table = to_table(found.full, found.truncated)
     if options.output is not None:
-        with publish(Path(options.output)) as temporary:
+        target = Path(options.output)
+        if not target.name:
+            raise words.UsageError(f"--output = {options.output!r}: must be the name of a file")
+        with publish(target) as temporary:
             table.to_csv(temporary, index=False)
     full, packed = found.full, found.truncated
     values = {

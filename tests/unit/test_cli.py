@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filtercake import api, bed, cli
-from filtercake.cli import main
+from filtercake.cli import build_parser, main
 from filtercake.errors import ConfigError, PackingRejected
 from filtercake.packing.pack import Outcome
 
@@ -113,10 +114,13 @@ def test_filter_area_and_its_inverse(capsys: Capture) -> None:
         (["resistance", "--porosity", "1.5", *PMMA], "--porosity = 1.5: must be less than 1"),
         (["resistance", "--porosity", "0.4", *PMMA], "--density-kg-m3: must be given"),
         (["resistance", *PMMA], "--porosity: must be given"),
+        (["resistance", *PMMA, "--porosity=1e-200", "--density-kg-m3=1"], "--porosity = 1e-200: is too small"),
         (["filter-area", "--resistance-m-kg", "1e8", *DRUM], "one of --slurry-flow-m3-h and --filter-area-m2"),
         (["filter-area", "--resistance-m-kg", "x", *DRUM], "--resistance-m-kg = x: must be a number"),
         (["porosity", "no/such.npz"], "cannot be read"),
         (["porosity"], "NPZ"),
+        (["porosity", ""], "is not the name"),
+        (["csd", *PMMA, "--output", ""], "must be the name of a file"),
         (["porosities"], "invalid choice"),
         ([], "COMMAND"),
     ],
@@ -242,20 +246,30 @@ def test_a_file_that_is_no_packing_is_refused(tmp_path: Path) -> None:
         api.porosity(npz)
 
 
-OPTIONS = sorted(
-    {
+PARSERS = build_parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+OPTIONS = {
+    command: sorted(
         name
-        for parser in cli.build_parser()._subparsers._group_actions[0].choices.values()  # type: ignore[union-attr]
-        for action in parser._actions
+        for action in PARSERS[command]._actions  # type: ignore[index, call-overload]
         for name in action.option_strings
-        if action.dest not in ("output", "results")
-    }
-)
+        if action.dest not in ("output", "help")
+    )
+    for command in COMMANDS
+}
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True).map(repr) | st.integers().map(str)
 WORDS = st.text(st.characters(exclude_characters="\0"), max_size=8) | NUMBERS
 PAIRS = st.lists(st.tuples(NUMBERS, NUMBERS).map(":".join), max_size=3).map(",".join)
 GOOD = st.sampled_from(["0.3", "20:0.5,50:0.5", "1e8", "15", "200", "ammonium_alum", "5", "1180", "53.3"])
-ARGUMENTS = st.lists(st.tuples(st.sampled_from(OPTIONS), GOOD | WORDS | PAIRS).map(list), max_size=8)
+
+
+def arguments_of(command: str) -> st.SearchStrategy[list[str]]:
+    """Options of a command, mostly its own, with values good and bad."""
+    option = st.sampled_from(OPTIONS[command]) | st.sampled_from(sorted({*chain(*OPTIONS.values())}))
+    pair = st.tuples(option, GOOD | WORDS | PAIRS).map("=".join) | st.sampled_from(["--json", "--profile"])
+    return st.lists(pair, max_size=8).map(lambda words: [command, *words])
+
+
+ARGUMENTS = st.sampled_from(COMMANDS).flatmap(arguments_of)
 
 
 @pytest.fixture(scope="module")
@@ -273,17 +287,14 @@ def no_settling(packed: Path, tmp_path_factory: pytest.TempPathFactory) -> Itera
         yield shelf
 
 
-@given(command=st.sampled_from(COMMANDS), pairs=ARGUMENTS, more=st.lists(WORDS, max_size=2))
-def test_no_argument_makes_it_fall_over(
-    no_settling: Path, command: str, pairs: list[list[str]], more: list[str]
-) -> None:
-    assert main([command, *more, *(word for pair in pairs for word in pair)]) in (0, 2)
+@given(arguments=ARGUMENTS, more=st.lists(WORDS, max_size=2))
+def test_no_argument_makes_it_fall_over(no_settling: Path, arguments: list[str], more: list[str]) -> None:
+    assert main([*arguments, *more]) in (0, 2)
 
 
-@given(pairs=ARGUMENTS)
-def test_no_option_of_pack_makes_it_fall_over(no_settling: Path, pairs: list[list[str]]) -> None:
-    given_ = [word for pair in pairs for word in pair if pair[0] not in ("--mixture", "--kinetics")]
-    assert main(["pack", *BED, *given_]) in (0, 2)
+@given(option=st.sampled_from(OPTIONS["pack"]), value=GOOD | WORDS)
+def test_no_option_of_pack_makes_it_fall_over(no_settling: Path, option: str, value: str) -> None:
+    assert main(["pack", *BED, option if option in ("--json", "--write-vtk") else f"{option}={value}"]) in (0, 2)
 
 
 @given(
