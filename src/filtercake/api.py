@@ -37,6 +37,9 @@ CRYSTALLIZER_OPTIONS = ("kinetics", "kinetics_file", "slurry_density_kg_m3", "bi
 PLAIN_DENSITY = 1000.0
 """Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it."""
 SLICES_PER_DIAMETER = 20
+LARGEST_RESISTANCE = 1e100
+"""m/kg; beyond, squares leave floating point."""
+OUT_OF_REACH = "a number is too small or too large to compute with"
 MILLIMETRE = 1e-3
 
 
@@ -235,10 +238,13 @@ def resistance(source: Distribution, **options: Any) -> Resistance:
         raise ConfigError([_problem("density_kg_m3", "(missing)", "must be given")])
     law = (given.porosity, source.full, density, given.sphericity)
     try:
-        return Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))
+        found = Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))
+        if found.resistance_m_kg <= LARGEST_RESISTANCE:
+            return found
     except (ZeroDivisionError, OverflowError):
-        allowed = f"is too small to compute with, at a density of {density:g} kg/m3"
-        raise ConfigError([_problem("porosity", f"{given.porosity:g}", allowed)]) from None
+        pass
+    allowed = f"is too small to compute with, at {density:g} kg/m3 and a sphericity of {given.sphericity:g}"
+    raise ConfigError([_problem("porosity", f"{given.porosity:g}", allowed)])
 
 
 def filter_area(**options: Any) -> FilterSize:
@@ -256,22 +262,14 @@ def filter_area(**options: Any) -> FilterSize:
         With every problem.
     """
     given = parse(FilterOptions, options, str(ORIGIN))
-    drum, alpha = _drum(given), given.resistance_m_kg
-    thickness = None
-    if given.porosity is not None and given.density_kg_m3 is not None:
-        thickness = float(cake_thickness(drum, alpha, given.porosity, given.density_kg_m3)) / MILLIMETRE
-    flow, wanted = given.slurry_flow_m3_h, given.filter_area_m2
-    if flow is None:
-        if wanted is None:
-            raise FilterError("needs exactly one of slurry_flow_m3_h and filter_area_m2")
-        flow = float(capacity(drum, alpha, wanted)) * HOUR
-    return FilterSize(
-        filter_area_m2=float(area(drum, alpha, flow / HOUR)) if wanted is None else wanted,
-        slurry_flow_m3_h=flow,
-        medium_share=float(medium_share(drum, alpha)),
-        cake_mass_kg_m2=float(cake_mass_per_area(drum, alpha)),
-        cake_thickness_mm=thickness,
-    )
+    try:
+        with np.errstate(all="ignore"):
+            found = _size(given)
+    except (ZeroDivisionError, OverflowError):
+        raise FilterError(OUT_OF_REACH) from None
+    if not (math.isfinite(found.filter_area_m2) and math.isfinite(found.slurry_flow_m3_h)):
+        raise FilterError(OUT_OF_REACH)
+    return found
 
 
 def porosity(npz: str | Path) -> PackingPorosity:
@@ -388,7 +386,7 @@ def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mappin
         try:
             loaded = check_study(study, ORIGIN)
         except (ZeroDivisionError, OverflowError):
-            raise ConfigError([_problem("options", "", "a number is too small or too large to compute with")]) from None
+            raise ConfigError([_problem("options", "", OUT_OF_REACH)]) from None
         _check_sums(loaded)
     return loaded
 
@@ -443,6 +441,26 @@ def _check_sums(study: LoadedStudy) -> None:
     if not (np.isfinite(csd.number_fraction).all() and np.isfinite(sums**2).all() and (sums**2 > 0.0).all()):
         shown = f"{csd.smallest / MICROMETRE:g} to {csd.largest / MICROMETRE:g} um"
         raise ConfigError([_problem("distribution", shown, "sizes are too small or too far apart to compute with")])
+
+
+def _size(given: FilterOptions) -> FilterSize:
+    drum, alpha = _drum(given), given.resistance_m_kg
+    thickness = None
+    if given.porosity is not None and given.density_kg_m3 is not None:
+        thickness = float(cake_thickness(drum, alpha, given.porosity, given.density_kg_m3)) / MILLIMETRE
+    if given.slurry_flow_m3_h is not None:
+        flow = given.slurry_flow_m3_h
+        needed = float(area(drum, alpha, flow / HOUR))
+    else:
+        needed = given.filter_area_m2 or 0.0  # the model lets one of the two pass
+        flow = float(capacity(drum, alpha, needed)) * HOUR
+    return FilterSize(
+        filter_area_m2=needed,
+        slurry_flow_m3_h=flow,
+        medium_share=float(medium_share(drum, alpha)),
+        cake_mass_kg_m2=float(cake_mass_per_area(drum, alpha)),
+        cake_thickness_mm=thickness,
+    )
 
 
 def _drum(given: FilterOptions) -> DrumFilter:

@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from filtercake import engine_choice
-from filtercake.api import ORIGIN, Distribution, csd_name, load
+from filtercake.api import ORIGIN, Distribution, csd_name, load, resistance
 from filtercake.config import Material
 from filtercake.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.errors import ConfigError, Problem
@@ -89,6 +89,8 @@ def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None,
     _check_folder(path)
     point = base_point(study, name, engine_choice.choose)
     csd = study.csds[name]
+    # a resistance beyond floating point is found before the packings are made, not after
+    resistance(source, porosity=0.01, density_kg_m3=point.spec.density, sphericity=study.model.material.sphericity)
     outcomes = _make(point, csd.truncated, path, say)
     sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
     rows = [_row(point, outcome, path, sizes, sphericity) for outcome in outcomes]
