@@ -131,7 +131,25 @@ def load_study(path: Path) -> LoadedStudy:
     ConfigError
         With every problem found in the file and the files it names.
     """
-    model = parse(Study, read_yaml(path), str(path))
+    return check_study(read_yaml(path), path)
+
+
+def check_study(values: Any, path: Path) -> LoadedStudy:
+    """Check a study's values, however they were given.
+
+    Parameters
+    ----------
+    values : Any
+        What the study's file holds.
+    path : Path
+        Its file, for messages and for the files it names.
+
+    Raises
+    ------
+    ConfigError
+        With every problem found in the values and the files they name.
+    """
+    model = parse(Study, values, str(path))
     model, kinetics, remarks = resolve(model, path)
     problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
     csds: dict[str, LoadedCsd] = {}

@@ -58,40 +58,40 @@ def study_template() -> str:
         "",
         "csds:",
         "  mine:",
-        f"    # {_text(Csd.model_fields['label'])}",
+        f"    # {meaning(Csd.model_fields['label'])}",
         "    # label: My crystals",
-        f"    # {_text(Csd.model_fields['mixture'])}",
+        f"    # {meaning(Csd.model_fields['mixture'])}",
         "    mixture:",
         "      - {size_um: 20, volume_fraction: 0.5}",
         "      - {size_um: 50, volume_fraction: 0.5}",
-        f"    # or: {_text(Csd.model_fields['file'])}",
+        f"    # or: {meaning(Csd.model_fields['file'])}",
         "    # file: ../csd/example.csv",
-        f"    # {_text(Csd.model_fields['truncate_below_volume_fraction'])}",
+        f"    # {meaning(Csd.model_fields['truncate_below_volume_fraction'])}",
         "    # truncate_below_volume_fraction: 0.001",
-        f"    # {_text(Csd.model_fields['truncate_below_um'])}",
+        f"    # {meaning(Csd.model_fields['truncate_below_um'])}",
         "    # truncate_below_um: 25",
-        f"    # {_text(Csd.model_fields['truncate_above_um'])}",
+        f"    # {meaning(Csd.model_fields['truncate_above_um'])}",
         "    # truncate_above_um: 500",
     ]
     for part, optional in (("crystallizer", Crystallizer), ("filter", Filter)):
-        lines += ["", f"# {_text(Study.model_fields[part])}", f"# {part}:"]
+        lines += ["", f"# {meaning(Study.model_fields[part])}", f"# {part}:"]
         for key, field in optional.model_fields.items():
-            lines.append(f"  # {_text(field)} Allowed: {_allowed(field)}.")
+            lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")
             lines.append(f"  # {key}: {EXAMPLES.get(key) or _yaml(field.get_default())}")
     for name, model, given in (("material", Material, {"density_kg_m3": "1180"}), ("packing", Packing, {})):
         lines += ["", f"# {_INTRO[name]}", f"{name}:" if given else f"# {name}:"]
         for key, field in model.model_fields.items():
-            lines.append(f"  # {_text(field)} Allowed: {_allowed(field)}.")
+            lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")
             default = _yaml(field.get_default(call_default_factory=True))
             lines.append(f"  {key}: {given[key]}" if key in given else f"  # {key}: {default}")
-    lines += ["", f"# {_text(Study.model_fields['sweeps'])}", "sweeps:", "  - csd: [mine]"]
+    lines += ["", f"# {meaning(Study.model_fields['sweeps'])}", "sweeps:", "  - csd: [mine]"]
     for key, field in Sweep.model_fields.items():
         if key != "csd":
-            lines.append(f"    # {_text(field)}")
+            lines.append(f"    # {meaning(field)}")
             lines.append(f"    # {key}: {'8' if key == 'replicates' else _example(key)}")
     lines += [
         "",
-        f"# {_text(Study.model_fields['published'])}",
+        f"# {meaning(Study.model_fields['published'])}",
         "# published:",
         "#   - {csd: mine, quantity: porosity, value: 0.36, source: my test, kind: measurement}",
     ]
@@ -127,7 +127,7 @@ def reference() -> str:
         lines += ["| key | default | allowed | meaning |", "|---|---|---|---|"]
         for key, field in model.model_fields.items():
             default = "required" if field.is_required() else f"`{_default_text(field)}`"
-            lines.append(f"| `{key}` | {default} | {_allowed(field)} | {_text(field)} |")
+            lines.append(f"| `{key}` | {default} | {allowed(field)} | {meaning(field)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -154,7 +154,8 @@ def _widen(node: Any) -> Any:
     return [_widen(item) for item in node] if isinstance(node, list) else node
 
 
-def _text(field: FieldInfo) -> str:
+def meaning(field: FieldInfo) -> str:
+    """Say what a field is, in the words of the model."""
     return (field.description or "").strip()
 
 
@@ -185,7 +186,7 @@ def _example(key: str) -> str:
     return examples[key]
 
 
-def _allowed(field: FieldInfo) -> str:
+def allowed(field: FieldInfo) -> str:
     """Say what values a field takes, from its annotation and bounds."""
     kinds = list(dict.fromkeys(_kinds(field.annotation)))
     bounds = list(_bounds([*field.metadata, *_inner_metadata(field.annotation)]))

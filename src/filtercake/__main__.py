@@ -1,0 +1,8 @@
+"""``python -m filtercake``: the command line."""
+
+import sys
+
+from filtercake.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())
