@@ -34,13 +34,13 @@ ESTIMATORS = {
     "porosity_as_published": "count",
 }
 """Estimators of the porosity by column: all are measured on the same packings."""
-DEFAULT = "default"
-"""Axis of the variant that the configuration's defaults make."""
+DEFAULT, ANALYTIC = "default", "analytic"
+"""Axes of the variant that the configuration's defaults make, and of models without packings."""
 AS_PUBLISHED_STEP = {"pmma": 0.1 * MICROSECOND, "alum": 0.5 * MICROSECOND}
 ALUM_STEPS = 120_000
 ALUM_SKIN = 10.0 * MICROMETRE
 TOLERANCE = 0.2
-"""Relative uncertainty of a measured error or time, within which no variant counts as better than another."""
+"""Relative uncertainty of a measured time, within which no variant counts as better than another."""
 PEER_CALLS = 20
 COVERAGE_SEED = 3001
 """Seeds from which an interval is asked for: neither the default's nor the reference's."""
@@ -276,7 +276,7 @@ def time_peers(csd: CrystalSizeDistribution) -> pd.DataFrame:
         for _ in range(PEER_CALLS):
             porosity = model(csd)
         seconds = (time.perf_counter() - started) / PEER_CALLS
-        row = {"axis": "analytic", "value": 0.0, "engine": name, "particles": 0, "replicate": 0, "steps": 0}
+        row = {"axis": ANALYTIC, "value": 0.0, "engine": name, "particles": 0, "replicate": 0, "steps": 0}
         rows.append({**row, "status": "ok", "wall_s": seconds, "porosity": porosity})
     return pd.DataFrame(rows)
 
@@ -416,20 +416,27 @@ def coverage(
 
 
 def on_front(table: pd.DataFrame, tolerance: float = TOLERANCE) -> pd.Series[bool]:
-    """Say which rows no other beats in both time and error by more than a tolerance, which is that of the measurement.
+    """Say which rows no other beats in both time and error by more than such a measurement can tell.
+
+    That is a tolerance, and of the error at least one standard error of the ratio of two spreads, from as many packings
+    as there are. Analytic models neither count nor beat: they know nothing of cohesion and friction, and what they hit
+    they hit by chance.
 
     Parameters
     ----------
     table : DataFrame
-        Rows with the columns seconds and error.
+        Rows with the columns axis, n, seconds and error.
     tolerance : float
         Relative.
     """
-    seconds, error = table["seconds"].to_numpy(), table["error"].to_numpy()
-    better = (seconds[None, :] < (1.0 - tolerance) * seconds[:, None]) & (
-        error[None, :] < (1.0 - tolerance) * error[:, None]
-    )
-    return pd.Series(~better.any(axis=1) & np.isfinite(error), index=table.index)
+    seconds, error = table["seconds"].to_numpy(np.float64), table["error"].to_numpy(np.float64)
+    packed = (table["axis"] != ANALYTIC).to_numpy()
+    # relative variance of a standard deviation
+    variance = 0.5 / np.maximum(table["n"].to_numpy(np.float64) - 1.0, 0.5)
+    margin = np.maximum(tolerance, np.sqrt(variance[:, None] + variance[None, :]))
+    faster = seconds[None, :] < (1.0 - tolerance) * seconds[:, None]
+    better = packed[None, :] & faster & (error[None, :] < (1.0 - margin) * error[:, None])
+    return pd.Series(~better.any(axis=1) & packed & np.isfinite(error), index=table.index)
 
 
 @dataclass(frozen=True)

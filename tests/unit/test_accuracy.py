@@ -86,10 +86,17 @@ def test_a_variant_of_which_nothing_was_accepted_is_told() -> None:
 
 
 def test_the_front() -> None:
-    points = pd.DataFrame({"seconds": [1.0, 2.0, 0.5, 4.0, 1.1], "error": [1.0, 0.5, 3.0, 0.7, 0.95]})
+    points = pd.DataFrame(
+        {"axis": "skin", "n": 1000, "seconds": [1.0, 2.0, 0.5, 4.0, 1.1], "error": [1.0, 0.5, 3.0, 0.7, 0.95]}
+    )
     # the fourth is beaten by the second; the last is not better than the first by more than can be measured
     assert list(on_front(points)) == [True, True, True, False, True]
-    assert not on_front(pd.DataFrame({"seconds": [1.0, 2.0], "error": [1.0, 2.0]})).iloc[1]
+    assert not on_front(pd.DataFrame({"axis": "skin", "n": 1000, "seconds": [1.0, 2.0], "error": [1.0, 2.0]})).iloc[1]
+    lucky = pd.DataFrame({"axis": ["analytic", "skin"], "n": 1000, "seconds": [1e-3, 1.0], "error": [0.1, 1.0]})
+    assert list(on_front(lucky)) == [False, True]
+    # of eight packings each, a spread lower by a third is chance
+    few = pd.DataFrame({"axis": "skin", "n": 8, "seconds": [1.0, 2.0, 2.0], "error": [0.7, 1.0, 1.5]})
+    assert list(on_front(few)) == [True, True, False]
 
 
 def test_references_are_found_by_study_and_friction() -> None:

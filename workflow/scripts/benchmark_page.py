@@ -14,7 +14,9 @@ from filtercake.packing.result import publish
 
 with job(snakemake.log[0]):
     table = pd.concat([pd.read_csv(file) for file in snakemake.input.errors], ignore_index=True)
-    table["on_front"] = table.groupby(["case", "estimator"], group_keys=False)[["seconds", "error"]].apply(on_front)
+    table["on_front"] = table.groupby(["case", "estimator"], group_keys=False)[["axis", "n", "seconds", "error"]].apply(
+        on_front
+    )
     references = pages.reference_table(pd.read_csv(snakemake.input.reference), snakemake.params.cases)
     with publish(Path(snakemake.output.table)) as temporary:
         table.to_csv(temporary, index=False)

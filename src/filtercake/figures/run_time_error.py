@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from filtercake.accuracy import DEFAULT
+from filtercake.accuracy import ANALYTIC, DEFAULT
 from filtercake.figures import style
 from filtercake.resistance import log_sensitivity
 from filtercake.units import FloatArray
@@ -23,7 +23,6 @@ CASES = {
 AXES = ("time step", "spheres", "stop tolerance", "skin", "engine", "softer contacts", "truncation")
 """What a variant differs in, in the order of colours."""
 AS_PUBLISHED = "as published"
-ANALYTIC = "analytic"
 INTERIOR, COUNT = "interior slab", "count"
 REPLICATES = (1, 2, 4, 8, 16, 32)
 LEAST_ERROR = 1e-4
