@@ -90,6 +90,13 @@ def test_one_accepted_packing_of_many_is_no_success(monkeypatch) -> None:
     assert row["reason"] == "still moving"
 
 
+def test_what_never_rests_is_not_tried_for_ever(monkeypatch) -> None:
+    monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("unsettled", "still moving"))
+    row = stability._judge(case(), [0.35, 0.351], 10)
+    assert (row["n"], row["n_accepted"], row["outcome"]) == (stability.HOPELESS, 0, "unsettled")
+    assert stability._reference(Scene(), 10) == []
+
+
 def test_a_bias_beyond_its_uncertainty_is_inaccurate(monkeypatch) -> None:
     values = iter([0.360, 0.3601, 0.3599, 0.360])
     monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("ok", porosity=next(values)))
