@@ -117,12 +117,6 @@ KNOWN.update(known_sizes)
 KNOWN_POINTS.update(points_by_name(known_sizes))
 
 
-def bed_size_tables(wildcards):
-    if bed_size_problem:
-        raise WorkflowError(f"bed_size cannot start:\n{bed_size_problem}")
-    return [f"{RESULTS}/{name}/replicates.csv" for name in BED_SIZES]
-
-
 rule bed_size:
     input:
         expand("{results}/benchmark/bed_size.csv", results=RESULTS),
@@ -449,7 +443,7 @@ rule benchmark_page:
         runtime=5,
     params:
         cases=ERROR_CASES,
-        data=str(ROOT / "docs" / "data"),
+        data=lambda wildcards, input: str(Path(input.reference).parent),
     message:
         "page on run time and error"
     script:

@@ -181,3 +181,9 @@ def begin_run():
             print(f"warning: {warning}", file=sys.stderr)
     if points_of_run():
         print(console.plan(points_of_run(), to_make), file=sys.stderr)
+
+
+def bed_size_tables(wildcards):
+    if bed_size_problem:
+        raise WorkflowError(f"bed_size cannot start:\n{bed_size_problem}")
+    return [f"{RESULTS}/{name}/replicates.csv" for name in BED_SIZES]
