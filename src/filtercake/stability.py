@@ -206,7 +206,8 @@ def _restitution_time_step() -> Iterable[Case]:
 
 def _size_ratio_skin() -> Iterable[Case]:
     names = ("size_ratio_skin", Embedded.name, "size_ratio")
-    yield from _grid(*names, (1.0, 2.5, 5.0, 10.0), "skin", (0.05, 0.2, 1.0, 5.0, 20.0))
+    yield from _grid(*names, (1.0, 2.5), "skin", (0.05, 0.2, 1.0, 5.0, 20.0))
+    yield from _grid(*names, (5.0, 10.0), "skin", (0.05, 0.2, 1.0, 5.0))
     yield from _grid(*names, (20.0, 50.0), "skin", (0.05, 1.0))
     yield from _grid("size_ratio_skin", Liggghts.name, "size_ratio", (1.0, 5.0), "skin", (0.05, 0.2, 1.0, 5.0))
 
@@ -249,17 +250,15 @@ def distribution(size_ratio: float) -> tuple[CrystalSizeDistribution, int, float
     """
     if size_ratio == 1.0:
         return CrystalSizeDistribution.from_classes([SMALL], [1.0]), PARTICLES, 1.0
-    if size_ratio <= 5.0:
-        return CrystalSizeDistribution.from_classes([SMALL, SMALL * size_ratio], [0.5, 0.5]), PARTICLES, 1.0
-    particles = PARTICLES * 8 if size_ratio <= 10.0 else WIDE_PARTICLES
-    large = max(LARGE_SPHERES, round(particles / size_ratio**3))
-    volume = large * size_ratio**3
-    share = volume / (volume + particles - large)
-    return (
-        CrystalSizeDistribution.from_classes([SMALL, SMALL * size_ratio], [1.0 - share, share]),
-        particles,
-        1.0 if size_ratio <= 10.0 else WIDE_COLUMN,
-    )
+    if size_ratio <= 10.0:
+        particles = PARTICLES * (1 if size_ratio <= 5.0 else 8)
+        share, column = 0.5, 1.0 if size_ratio < 5.0 else 3.0
+    else:
+        particles, column = WIDE_PARTICLES, WIDE_COLUMN
+        large = max(LARGE_SPHERES, round(particles / size_ratio**3)) * size_ratio**3
+        share = large / (large + particles - LARGE_SPHERES)
+    csd = CrystalSizeDistribution.from_classes([SMALL, SMALL * size_ratio], [1.0 - share, share])
+    return csd, particles, column
 
 
 def spec_of(case: Case) -> tuple[PackingSpec, CrystalSizeDistribution]:
