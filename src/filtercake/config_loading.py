@@ -361,6 +361,7 @@ def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str
                 keys = {
                     "cohesion": where["cohesion_kJ_m3"],
                     "time_step": _time_step_key(packing, step / rayleigh),
+                    "restitution": where["restitution"],
                     "density": ("material.density_kg_m3", material.density),
                 }
                 yield (

@@ -24,6 +24,14 @@ LARGEST_DENSITY: Final = 25_000.0
 """Crystal density, kg/m3, over that of any solid: heavier spheres strike soft contacts too hard."""
 LARGEST_TIME_STEP: Final = 1.0
 """Time step over the Rayleigh step from which beds explode: refused."""
+SMALL_RESTITUTION, DAMPED_TIME_STEP = 0.1, 0.5
+"""Restitution under which contacts are damped so hard that a longer step gives wrong porosities: refused."""
+LIGGGHTS_RESTITUTION: Final = 0.05
+"""LIGGGHTS takes no restitution of this or less: warned."""
+LARGE_RESTITUTION: Final = 0.95
+"""Restitution above which beds hardly come to rest: warned."""
+FRICTIONAL_LIMIT: Final = 0.36
+"""Time step over the Rayleigh step above which frictional beds never come to rest: warned (acceptance refuses them)."""
 LARGEST_RELATIVE_OVERLAP: Final = 0.035
 """Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
 DOUBTFUL_RELATIVE_OVERLAP: Final = 0.01
@@ -70,7 +78,7 @@ class Finding:
 
     Attributes
     ----------
-    key : {"cohesion", "time_step", "density"}
+    key : {"cohesion", "time_step", "density", "restitution"}
         Which number it is about.
     text : str
         What is wrong, with the number that is allowed and the page that shows why.
@@ -103,6 +111,12 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
             f"must be below the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us ({PAGE}); leave it out for "
             f"{FRICTIONLESS_TIME_STEP:g} of that (without friction) or {FRICTIONAL_TIME_STEP:g} (with)",
         )
+    elif scene.restitution < SMALL_RESTITUTION and scene.time_step > (DAMPED_TIME_STEP + 1e-9) * scene.rayleigh:
+        yield Finding(
+            "time_step",
+            f"must be at most {DAMPED_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us where the "
+            f"restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look right ({PAGE})",
+        )
 
 
 def doubts(scene: Numbers) -> Iterator[Finding]:
@@ -112,6 +126,20 @@ def doubts(scene: Numbers) -> Iterator[Finding]:
             "cohesion",
             f"contacts overlap by {scene.overlap:.1%} of the diameter, which alone lowers the porosity by about "
             f"{3 * 0.65 * scene.overlap:.3f} ({PAGE})",
+        )
+    if scene.restitution <= LIGGGHTS_RESTITUTION:
+        yield Finding(
+            "restitution", f"LIGGGHTS takes only more than {LIGGGHTS_RESTITUTION:g}; use engine: embedded ({PAGE})"
+        )
+    if scene.restitution > LARGE_RESTITUTION:
+        yield Finding(
+            "restitution", f"over {LARGE_RESTITUTION:g} beds hardly come to rest; raise packing.max_fall_times ({PAGE})"
+        )
+    if scene.friction > 0.0 and scene.time_step > (FRICTIONAL_LIMIT + 1e-9) * scene.rayleigh:
+        yield Finding(
+            "time_step",
+            f"over {FRICTIONAL_LIMIT:g} of the Rayleigh time step frictional beds never come to rest, and are not accepted; "
+            f"leave it out for {FRICTIONAL_TIME_STEP:g} ({PAGE})",
         )
 
 

@@ -51,6 +51,30 @@ def test_outside_is_refused(changed: dict[str, float], key: str, says: str) -> N
     assert fence.verdict(scene) == "refused"
 
 
+def test_hard_damping_takes_a_short_step() -> None:
+    scene = replace(SCENE, restitution=0.06, time_step=0.6 * RAYLEIGH)
+    (finding,) = fence.refusals(scene)
+    assert finding.key == "time_step"
+    assert "at most 0.5 of the Rayleigh time step 0.8223 us" in finding.text
+    assert fence.verdict(replace(scene, time_step=0.5 * RAYLEIGH)) == "allowed"
+    assert fence.verdict(replace(scene, restitution=0.1)) == "allowed"
+
+
+@pytest.mark.parametrize(
+    ("changed", "key", "says"),
+    [
+        ({"restitution": 0.05}, "restitution", "engine: embedded"),
+        ({"restitution": 0.96}, "restitution", "hardly come to rest"),
+        ({"friction": 0.05, "time_step": 0.4 * RAYLEIGH}, "time_step", "frictional beds never come to rest"),
+    ],
+)
+def test_what_may_not_end_well_is_warned_about(changed: dict[str, float], key: str, says: str) -> None:
+    (finding,) = fence.doubts(replace(SCENE, **changed))
+    assert finding.key == key
+    assert says in finding.text
+    assert fence.PAGE in finding.text
+
+
 def test_soft_contacts_are_warned_about() -> None:
     scene = replace(SCENE, cohesion=150e3)
     (finding,) = fence.doubts(scene)
