@@ -114,8 +114,9 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
     elif scene.restitution < SMALL_RESTITUTION and scene.time_step > (DAMPED_TIME_STEP + 1e-9) * scene.rayleigh:
         yield Finding(
             "time_step",
-            f"must be at most {DAMPED_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us where the "
-            f"restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look right ({PAGE})",
+            f"must be at most {DAMPED_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us where "
+            f"the restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look right "
+            f"({PAGE})",
         )
 
 
@@ -138,8 +139,8 @@ def doubts(scene: Numbers) -> Iterator[Finding]:
     if scene.friction > 0.0 and scene.time_step > (FRICTIONAL_LIMIT + 1e-9) * scene.rayleigh:
         yield Finding(
             "time_step",
-            f"over {FRICTIONAL_LIMIT:g} of the Rayleigh time step frictional beds never come to rest, and are not accepted; "
-            f"leave it out for {FRICTIONAL_TIME_STEP:g} ({PAGE})",
+            f"over {FRICTIONAL_LIMIT:g} of the Rayleigh time step frictional beds never come to rest, and are not "
+            f"accepted; leave it out for {FRICTIONAL_TIME_STEP:g} ({PAGE})",
         )
 
 
