@@ -114,8 +114,8 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
     elif scene.restitution < SMALL_RESTITUTION and scene.time_step > (DAMPED_TIME_STEP + 1e-9) * scene.rayleigh:
         yield Finding(
             "time_step",
-            f"must be at most {DAMPED_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us "
-            f"where the restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look right "
+            f"must be at most {DAMPED_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} "
+            f"us where the restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look right "
             f"({PAGE})",
         )
 
