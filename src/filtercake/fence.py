@@ -115,8 +115,8 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
         yield Finding(
             "time_step",
             f"must be at most {DAMPED_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} "
-            f"us where the restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look right "
-            f"({PAGE})",
+            f"us where the restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look "
+            f"right ({PAGE})",
         )
 
 
