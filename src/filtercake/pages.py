@@ -125,7 +125,7 @@ def stability(template: Path, table: pd.DataFrame) -> str:
         wrong=_records(table[wrong]),
         undetected=_records(undetected(table)),
         drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),
-        gain=float(table.loc[table["outcome"] == "ok", "energy_gain"].max()),
+        gain=float(table.loc[(table["outcome"] == "ok") & (table["fence"] == "allowed"), "energy_gain"].max()),
     )
 
 
