@@ -15,6 +15,7 @@ from filtercake import contact
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROSECOND
 
 PAGE: Final = "docs/stability.md"
+ERROR_PAGE: Final = "docs/benchmark.md"
 
 FRICTIONLESS_TIME_STEP: Final = 0.5
 """Default time step over the Rayleigh step at mu = 0."""
@@ -140,7 +141,7 @@ def doubts(scene: Numbers) -> Iterator[Finding]:
         yield Finding(
             "time_step",
             f"over {FRICTIONAL_LIMIT:g} of the Rayleigh time step frictional beds never come to rest, and are not "
-            f"accepted; leave it out for {FRICTIONAL_TIME_STEP:g} ({PAGE})",
+            f"accepted; leave it out for {FRICTIONAL_TIME_STEP:g} ({ERROR_PAGE})",
         )
 
 
