@@ -10,7 +10,7 @@ import jinja2
 import pandas as pd
 
 from filtercake.accuracy import DEFAULT, reference_of
-from filtercake.stability import COVERAGE, OUTCOMES, WRONG, undetected
+from filtercake.stability import COVERAGE, OUTCOMES, WRONG, families, undetected
 
 INTERIOR, COUNT = "interior slab", "count"
 PAPER = "as published"
@@ -122,6 +122,7 @@ def stability(template: Path, table: pd.DataFrame) -> str:
             for fence, group in table.groupby("fence")
         ],
         total=len(table),
+        absent=[name for name in families() if name not in set(table["family"])],
         wrong=_records(table[wrong]),
         undetected=_records(undetected(table)),
         drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),

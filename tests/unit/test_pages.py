@@ -112,6 +112,9 @@ def test_the_stability_page_tells_the_wrong_ones() -> None:
     assert set(table["fence"]) == {"allowed", "warned", "refused"}
     page = pages.stability(TEMPLATES / "stability.md.j2", table)
     assert f"{len(table)} cases" in page
+    assert "Not among these results" not in page
+    part = pages.stability(TEMPLATES / "stability.md.j2", table[table["family"] != "size_ratio_skin"])
+    assert "though `make stability` makes them: size_ratio_skin." in part
     assert "None: every accepted packing" in page
     assert "the bed exploded / far away" in page
     place = table.index[table["fence"] == "allowed"][0]
