@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -27,7 +27,6 @@ from filtercake.config import (
     Workflow,
 )
 from filtercake.config_loading import LoadedStudy, find_studies, load_study, parse, read_yaml
-from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
 from filtercake.fence import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
 from filtercake.filtration import CompressibilityFit
@@ -41,11 +40,10 @@ from filtercake.measurements import (
     same_pressure,
 )
 from filtercake.resistance import implied_porosity
-from filtercake.study import expand
+from filtercake.study import ChooseEngine, expand
 from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL
 
 Pressure = Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False), TO_NUMBER]
-ChooseEngine = Callable[[CrystalSizeDistribution, int], str]
 
 
 class CohesionRange(Model):

@@ -375,6 +375,7 @@ def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str
                         friction=value["friction"],
                         cohesion=value["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
                         time_step=step,
+                        engine=packing.engine,
                     ),
                 )
 

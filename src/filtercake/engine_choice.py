@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from filtercake.config_loading import LoadedStudy
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
+from filtercake.fence import LIGGGHTS_RESTITUTION
 from filtercake.packing.cloud import NARROW
 from filtercake.packing.engines import ENGINES
 
@@ -14,13 +15,15 @@ SMALL_BED = 10_000
 """Spheres up to which LIGGGHTS is taken whatever the width of the distribution."""
 
 
-def choose(csd: CrystalSizeDistribution, particles: int) -> str:
+def choose(csd: CrystalSizeDistribution, particles: int, restitution: float) -> str:
     """Name the engine for ``engine: auto``.
 
-    LIGGGHTS where it is installed and the bed is small or narrow; the embedded engine everywhere else: LIGGGHTS
-    lists neighbours on one grid, which a wide distribution fills with pairs that never touch.
+    LIGGGHTS where it is installed, takes the restitution, and the bed is small or narrow; the embedded engine
+    everywhere else: LIGGGHTS lists neighbours on one grid, which a wide distribution fills with pairs that never
+    touch.
     """
-    suits = particles <= SMALL_BED or csd.largest <= NARROW * csd.smallest
+    fast = particles <= SMALL_BED or csd.largest <= NARROW * csd.smallest
+    suits = fast and restitution > LIGGGHTS_RESTITUTION
     return "liggghts" if suits and ENGINES["liggghts"]().why_missing() is None else "embedded"
 
 

@@ -28,7 +28,7 @@ LARGEST_TIME_STEP: Final = 1.0
 SMALL_RESTITUTION, DAMPED_TIME_STEP = 0.1, 0.5
 """Restitution under which contacts are damped so hard that a longer step gives wrong porosities: refused."""
 LIGGGHTS_RESTITUTION: Final = 0.05
-"""LIGGGHTS takes no restitution of this or less: warned."""
+"""LIGGGHTS takes no restitution of this or less: refused with that engine."""
 LARGE_RESTITUTION: Final = 0.95
 """Restitution above which beds hardly come to rest: warned."""
 FRICTIONAL_LIMIT: Final = 0.36
@@ -51,6 +51,8 @@ class Numbers:
         The material, SI.
     time_step : float
         Time step, s.
+    engine : str
+        The engine asked for.
     """
 
     smallest: float
@@ -61,6 +63,7 @@ class Numbers:
     friction: float
     cohesion: float
     time_step: float
+    engine: str = "auto"
 
     @property
     def rayleigh(self) -> float:
@@ -119,6 +122,10 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
             f"us where the restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look "
             f"right ({PAGE})",
         )
+    if scene.engine.startswith("liggghts") and scene.restitution <= LIGGGHTS_RESTITUTION:
+        yield Finding(
+            "restitution", f"LIGGGHTS takes only more than {LIGGGHTS_RESTITUTION:g}; use engine: embedded ({PAGE})"
+        )
 
 
 def doubts(scene: Numbers) -> Iterator[Finding]:
@@ -128,10 +135,6 @@ def doubts(scene: Numbers) -> Iterator[Finding]:
             "cohesion",
             f"contacts overlap by {scene.overlap:.1%} of the diameter, which alone lowers the porosity by about "
             f"{3 * 0.65 * scene.overlap:.3f} ({PAGE})",
-        )
-    if scene.restitution <= LIGGGHTS_RESTITUTION:
-        yield Finding(
-            "restitution", f"LIGGGHTS takes only more than {LIGGGHTS_RESTITUTION:g}; use engine: embedded ({PAGE})"
         )
     if scene.restitution > LARGE_RESTITUTION:
         yield Finding(

@@ -407,6 +407,7 @@ def _numbers(spec: PackingSpec, csd: CrystalSizeDistribution) -> fence.Numbers:
         friction=spec.friction,
         cohesion=spec.cohesion,
         time_step=spec.time_step,
+        engine=spec.engine,
     )
 
 

@@ -27,6 +27,9 @@ from filtercake.precision import half_width
 from filtercake.resistance import carman_sauter, kozeny_carman
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE, tidy
 
+ChooseEngine = Callable[[CrystalSizeDistribution, int, float], str]
+"""Names an engine from a distribution, a number of particles and a restitution."""
+
 MEASURED = (
     "porosity",
     "porosity_as_published",
@@ -143,7 +146,7 @@ def with_engine(study: LoadedStudy, engine: str) -> LoadedStudy:
     return replace(study, name=f"{study.name}_{engine}", model=model)
 
 
-def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution, int], str]) -> list[Point]:
+def expand(study: LoadedStudy, choose_engine: ChooseEngine) -> list[Point]:
     """List a study's points: the union of its sweeps; a point in two sweeps is visited once.
 
     Parameters
@@ -151,7 +154,7 @@ def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution,
     study : LoadedStudy
         The checked study.
     choose_engine : callable
-        Names the engine for ``engine: auto``, from a distribution and a number of particles.
+        Names the engine for ``engine: auto``, from a distribution, a number of particles and a restitution.
     """
     points: dict[str, Point] = {}
     for sweep in study.model.sweeps:
@@ -168,7 +171,7 @@ def expand(study: LoadedStudy, choose_engine: Callable[[CrystalSizeDistribution,
 def base_point(
     study: LoadedStudy,
     csd: str,
-    choose_engine: Callable[[CrystalSizeDistribution, int], str],
+    choose_engine: ChooseEngine,
     **changed: float,
 ) -> Point:
     """Return the point of a distribution at the study's base material, but for the properties named by ``changed``."""
@@ -331,14 +334,14 @@ def _point(
     csd_name: str,
     swept: dict[str, float],
     replicates: int,
-    choose_engine: Callable[[CrystalSizeDistribution, int], str],
+    choose_engine: ChooseEngine,
 ) -> Point:
     settings, material = study.model.packing, study.model.material
     csd = study.csds[csd_name].truncated
     modulus, poisson = swept["youngs_modulus_MPa"] * MEGAPASCAL, swept["poisson_ratio"]
     rayleigh = contact.rayleigh_time_step(0.5 * csd.smallest, material.density, modulus, poisson)
     bed = bed_of(settings, csd)
-    engine = settings.engine if settings.engine != "auto" else choose_engine(csd, bed.particles)
+    engine = settings.engine if settings.engine != "auto" else choose_engine(csd, bed.particles, swept["restitution"])
     spec = PackingSpec(
         particles=bed.particles,
         void_fraction=settings.void_fraction,

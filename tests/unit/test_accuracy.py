@@ -203,9 +203,9 @@ def test_choices_stand_against_the_default() -> None:
 
 def test_the_benchmarks_scenes_are_the_defaults() -> None:
     study = load_study(accuracy_study())
-    spec = base_point(study, "pmma_50_50", lambda _csd, _n: "embedded").spec
+    spec = base_point(study, "pmma_50_50", lambda *_: "embedded").spec
     assert variants("pmma", spec, study.csds["pmma_50_50"].full)[0].contender.spec == replace(spec, processes=1)
-    frictional = base_point(study, "pmma_50_50", lambda _csd, _n: "embedded", friction=0.3).spec
+    frictional = base_point(study, "pmma_50_50", lambda *_: "embedded", friction=0.3).spec
     assert frictional.friction == 0.3
     assert math.isclose(frictional.rayleigh_fraction(20e-6), 0.2)
 

@@ -42,7 +42,7 @@ FLOW = 20.0 / 3600.0
 
 
 def make(study: LoadedStudy, porosities: dict[str, list[float | None]] | None = None, **model: Any) -> StudyData:
-    points = expand(study, lambda _csd, _n: "embedded")
+    points = expand(study, lambda *_: "embedded")
     rows = []
     for point in points:
         full = study.csds[point.csd].full
@@ -112,14 +112,14 @@ def series(axes: Axes) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndar
 
 class TestCatalogue:
     def test_alum_has_them_all(self, study: LoadedStudy) -> None:
-        assert set(NAMES) <= set(figures_of(expand(study, lambda _csd, _n: "embedded"), study.model))
+        assert set(NAMES) <= set(figures_of(expand(study, lambda *_: "embedded"), study.model))
 
     def test_a_study_without_a_crystallizer_has_none(self) -> None:
         pmma = load_study(STUDIES / "pmma.yaml")
-        assert not set(NAMES) & set(figures_of(expand(pmma, lambda _csd, _n: "embedded"), pmma.model))
+        assert not set(NAMES) & set(figures_of(expand(pmma, lambda *_: "embedded"), pmma.model))
 
     def test_each_depends_on_its_part_of_the_study(self, study: LoadedStudy) -> None:
-        points = expand(study, lambda _csd, _n: "embedded")
+        points = expand(study, lambda *_: "embedded")
         no_filter = figures_of(points, study.model.model_copy(update={"filter": None}))
         assert set(NAMES) & set(no_filter) == set(NAMES) - set(FILTER)
         one = {name: csd for name, csd in study.model.csds.items() if name == "tau_15min"}

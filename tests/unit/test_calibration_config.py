@@ -41,7 +41,7 @@ def test_a_calibration_is_a_study_of_its_own(tmp_path: Path) -> None:
 
 
 def test_candidates_are_every_point_in_every_batch(tmp_path: Path) -> None:
-    found = candidates(load(tmp_path), lambda _csd, _n: "")
+    found = candidates(load(tmp_path), lambda *_: "")
     assert len(found) == BATCHES * 2 * 9 * 2
     assert len({item.point.name for item in found}) == len(found)
     assert {item.point.spec.seed for item in found if item.batch == 0} == {1}

@@ -636,8 +636,8 @@ def test_a_present_engine_is_no_problem(
 
 def test_auto_needs_nothing_installed(nowhere: Path, study_from: Callable[..., Any], alum: Any, small_csd: Any) -> None:
     engine_choice.check([study_from()])
-    assert engine_choice.choose(small_csd, 2000) == "embedded"
-    assert engine_choice.choose(alum(15)[1].csd, 100_000) == "embedded"
+    assert engine_choice.choose(small_csd, 2000, 0.3) == "embedded"
+    assert engine_choice.choose(alum(15)[1].csd, 100_000, 0.3) == "embedded"
 
 
 def test_auto_takes_liggghts_where_it_is_installed_and_suits(nowhere: Path, alum: Any, small_csd: Any) -> None:
@@ -645,10 +645,11 @@ def test_auto_takes_liggghts_where_it_is_installed_and_suits(nowhere: Path, alum
     program.write_text("#!/bin/sh\n", encoding="utf-8")
     program.chmod(0o755)
     wide = alum(15)[1].csd
-    assert engine_choice.choose(small_csd, 2000) == "liggghts"
-    assert engine_choice.choose(small_csd, 100_000) == "liggghts"  # narrow
-    assert engine_choice.choose(wide, 2000) == "liggghts"  # small
-    assert engine_choice.choose(wide, 100_000) == "embedded"
+    assert engine_choice.choose(small_csd, 2000, 0.3) == "liggghts"
+    assert engine_choice.choose(small_csd, 100_000, 0.3) == "liggghts"  # narrow
+    assert engine_choice.choose(wide, 2000, 0.3) == "liggghts"  # small
+    assert engine_choice.choose(wide, 100_000, 0.3) == "embedded"
+    assert engine_choice.choose(small_csd, 2000, 0.05) == "embedded"  # LIGGGHTS does not take it
 
 
 # --- a crystallizer ------------------------------------------------------------------------------------------------
@@ -677,7 +678,7 @@ def test_residence_times_become_distributions(tmp_path: Path) -> None:
     assert product.crystallizer.size_scale == pytest.approx(58.417e-6, rel=1e-5)
     assert (product.truncated.smallest, product.truncated.largest) == pytest.approx((32.5e-6, 543.3e-6), abs=0.06e-6)
     assert study.model.material.density == 2450.0
-    points = expand(study, lambda _csd, _n: "embedded")
+    points = expand(study, lambda *_: "embedded")
     assert [point.residence_time_min for point in points] == [15.0, 7.5]
     assert points[0].name.startswith("tau_15min_s50_mu0_")
 

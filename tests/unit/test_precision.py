@@ -122,7 +122,7 @@ sweeps:
   - csd: [broad, narrow]
 """
     )
-    broad, narrow = expand(load_study(path), lambda _csd, _n: "embedded")
+    broad, narrow = expand(load_study(path), lambda *_: "embedded")
     assert (narrow.spec.particles, narrow.spec.column_ratio) == (2000, 1.0)
     assert (broad.porosity_interval, broad.replicates, broad.most_replicates) == (0.002, 4, 30)
     # 4.6 x 4.6 x 10 largest diameters at 70 % solids

@@ -49,7 +49,7 @@ sweeps:
 
 
 def points(study: LoadedStudy) -> list[Point]:
-    return expand(study, lambda _csd, _particles: "liggghts")
+    return expand(study, lambda *_: "liggghts")
 
 
 @pytest.fixture
@@ -113,13 +113,13 @@ def test_friction_shortens_the_default_step_and_nothing_else_does(points_of) -> 
 def test_auto_asks_for_an_engine(study_from) -> None:
     asked = []
 
-    def choose(csd: Any, particles: int) -> str:
-        asked.append((csd.size.tolist(), particles))
+    def choose(csd: Any, particles: int, restitution: float) -> str:
+        asked.append((csd.size.tolist(), particles, restitution))
         return "some_engine"
 
     found = expand(study_from(SWEEPS + "  - {csd: [a, b]}\n"), choose)
     assert [point.spec.engine for point in found] == ["some_engine"] * 2
-    assert [particles for _, particles in asked] == [500, 500]
+    assert [rest for _, *rest in asked] == [[500, 0.3], [500, 0.3]]
     named = SWEEPS.replace("replicates: 3", "replicates: 3, engine: liggghts_as_published")
     assert expand(study_from(named + "  - {csd: a}\n"), choose)[0].spec.engine == "liggghts_as_published"
 

@@ -110,7 +110,7 @@ def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> No
     rows = []
     printed = {"tau_15min": (0.293, 3.44), "tau_30min": (0.2925, 3.15), "tau_45min": (0.2925, 3.00)}
     printed["tau_60min"] = (0.292, 2.905)
-    for point in expand(alum_study, lambda _csd, _n: "embedded"):
+    for point in expand(alum_study, lambda *_: "embedded"):
         porosity = printed[point.csd][0]
         alpha = kozeny_carman(porosity, alum_study.csds[point.csd].full, 2450.0)
         for sign in (-1, 1):
@@ -139,7 +139,7 @@ def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:
     # put the paper's porosities in place of ours: eq. 3 must give the paper's resistances (3 figures printed)
     printed = {"pmma_75_25": (0.392, 3.04e9), "pmma_50_50": (0.359, 3.06e9), "pmma_25_75": (0.358, 1.97e9)}
     rows = []
-    for point in expand(pmma_study, lambda _csd, _n: "liggghts"):
+    for point in expand(pmma_study, lambda *_: "liggghts"):
         porosity = printed[point.csd][0] if point.spec.cohesion == 50e3 and point.spec.friction == 0 else 0.5
         if (point.spec.poisson_ratio, point.spec.restitution) != (0.2, 0.3):
             porosity = 0.6
@@ -179,7 +179,7 @@ def packings(study: LoadedStudy, porosities: dict[str, list[float]]) -> pd.DataF
     return pd.DataFrame(
         [
             {**point.row(), "status": "ok", "porosity": value - 0.01, "porosity_as_published": value}
-            for point in expand(study, lambda _csd, _n: "embedded")
+            for point in expand(study, lambda *_: "embedded")
             for value in porosities.get(point.csd, [])
         ]
     )
