@@ -236,7 +236,7 @@ def _alum(make: _Maker) -> list[Variant]:
 
 
 def _alum_wide(make: _Maker) -> list[Variant]:
-    listed = [make.default(3)]
+    listed = [make.default(12)]
     return listed + make.as_published(1, AS_PUBLISHED_STEP["alum"], ALUM_STEPS, ALUM_SKIN)
 
 
