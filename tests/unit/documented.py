@@ -21,7 +21,19 @@ TUTORIAL = "docs/tutorial.md"
 
 SHELL = frozenset({"", "sh", "bash", "shell", "console"})
 LANGUAGES = SHELL | {"yaml", "python", "csv", "text"}
-PROGRAMS = ("make", "snakemake", "filtercake", "python", "python3", "pip", "git", "sbatch", "squeue", "scancel", "sinfo")
+PROGRAMS = (
+    "make",
+    "snakemake",
+    "filtercake",
+    "python",
+    "python3",
+    "pip",
+    "git",
+    "sbatch",
+    "squeue",
+    "scancel",
+    "sinfo",
+)
 """A code span in prose that starts with one of these and has arguments is a command."""
 
 _FENCE = re.compile(r"^(?P<indent> *)```(?P<language>\w*)[^\n]*\n(?P<text>.*?)^ *```$", re.MULTILINE | re.DOTALL)
@@ -107,7 +119,9 @@ def spans(page: str) -> list[Command]:
     found = []
     for paragraph in re.finditer(r"(?:^[^\n]+\n)+", text + "\n", re.MULTILINE):
         for span in re.finditer(r"`([^`]+)`", paragraph[0]):
-            command = Command(page, text.count("\n", 0, paragraph.start() + span.start()) + 1, " ".join(span[1].split()))
+            command = Command(
+                page, text.count("\n", 0, paragraph.start() + span.start()) + 1, " ".join(span[1].split())
+            )
             if _is_command(command):
                 found.append(command)
     return found

@@ -8,6 +8,8 @@ that is none of these stands in :data:`RUN_BY`, beside the test that runs it.
 
 from __future__ import annotations
 
+import doctest
+import importlib
 import importlib.util
 import re
 import shlex
@@ -40,6 +42,7 @@ from snakemake.cli import get_argument_parser
 
 from filtercake import engine_choice
 from filtercake.calibration_config import Calibration, load_calibration
+from filtercake.cli import EXAMPLES as HELP_EXAMPLES
 from filtercake.cli import build_parser, main
 from filtercake.config_loading import load_study, load_workflow, read_yaml
 from filtercake.crystallizer import load_kinetics
@@ -83,7 +86,9 @@ PARTS = ("Snakefile", "Makefile", "config", "workflow", "profiles", "liggghts_te
 API_PAGE = "docs/api.md"
 
 STUDY = {
-    "csds": {"bimodal": {"mixture": [{"size_um": 20, "volume_fraction": 0.5}, {"size_um": 50, "volume_fraction": 0.5}]}},
+    "csds": {
+        "bimodal": {"mixture": [{"size_um": 20, "volume_fraction": 0.5}, {"size_um": 50, "volume_fraction": 0.5}]}
+    },
     "material": {"density_kg_m3": 1180},
     "sweeps": [{"csd": "bimodal"}],
 }
@@ -254,7 +259,11 @@ def dry_run(root: Path, asked: Asked) -> dict[str, int]:
     done = subprocess.run(
         [*command, "--config", *config],
         cwd=root,
-        env={"PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin", "PYTHONPATH": str(root / "src"), "HOME": str(root)},
+        env={
+            "PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin",
+            "PYTHONPATH": str(root / "src"),
+            "HOME": str(root),
+        },
         capture_output=True,
         text=True,
         timeout=300,
@@ -362,6 +371,28 @@ def test_a_piece_with_a_wrong_key_is_noticed(tmp_path: Path) -> None:
 def test_the_page_of_the_command_line_shows_every_command() -> None:
     shown = {command.words[1] for block in blocks("docs/command-line.md") for command in commands_of(block)}
     assert command_names() == shown
+
+
+def test_the_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(REPOSITORY / "config" / "test", tmp_path / "config" / "test")
+    monkeypatch.chdir(tmp_path)
+    tiny = "config/test/tiny.yaml"
+    point = expand(load_study(Path(tiny)), engine_choice.choose)[0].name
+    asked = {"pmma": tiny, "pmma_50_s50_mu0_1a2b3c4d": point, "0.003": "0.1"}
+    assert set(HELP_EXAMPLES) == command_names()
+    for name, text in HELP_EXAMPLES.items():
+        program, *words = shlex.split(text)
+        small = [*QUICK, "--particles", "200"] if name == "pack" else []
+        assert program == "filtercake"
+        assert main([asked.get(word, word) for word in words] + small) == 0, text
+
+
+def test_docstrings_hold_no_example_that_nobody_runs() -> None:
+    """Examples are on the pages; one in a docstring (``>>>``) must pass as a doctest."""
+    for path in sorted((REPOSITORY / "src" / "filtercake").rglob("*.py")):
+        if ">>>" in path.read_text(encoding="utf-8"):
+            name = ".".join(path.relative_to(REPOSITORY / "src").with_suffix("").parts)
+            assert doctest.testmod(importlib.import_module(name)).failed == 0, path
 
 
 EXAMPLES = [block for block in blocks(API_PAGE) if block.language == "python"]

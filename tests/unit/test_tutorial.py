@@ -82,7 +82,9 @@ def test_a_clean_clone_follows_the_tutorial(tmp_path: Path) -> None:
     reader = Reader(tmp_path)
     for block in blocks(TUTORIAL):
         reader.follow(block)
-    in_prose = [command for command in spans(TUTORIAL) if command.words[1:2] == ["report"] or "STUDIES=" in command.text]
+    in_prose = [
+        command for command in spans(TUTORIAL) if command.words[1:2] == ["report"] or "STUDIES=" in command.text
+    ]
     for command in in_prose:
         if subprocess.run(["make", "-n", *command.words[1:]], cwd=reader.clone, capture_output=True).returncode == 0:
             reader.type(command.text)
