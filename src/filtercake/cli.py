@@ -32,7 +32,7 @@ Line = tuple[str, Any, str]
 """Name, value and unit of one number."""
 Command = Callable[[argparse.Namespace], int]
 
-_EXAMPLES = {
+EXAMPLES = {
     "csd": "filtercake csd --kinetics ammonium_alum --residence-time-min 15 --slurry-density-kg-m3 200",
     "pack": "filtercake pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --porosity-interval 0.003 --output packing",
     "resistance": "filtercake resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5",
@@ -44,6 +44,7 @@ _EXAMPLES = {
         "--pressure-drop-kPa 53.3 --submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9"
     ),
 }
+"""One call of each command, shown by its --help."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -109,7 +110,7 @@ def build_parser() -> words.Parser:
 
 def _command(commands: Any, name: str, run: Command, text: str) -> words.Parser:
     parser: words.Parser = commands.add_parser(
-        name, help=text, description=text, epilog=f"example:\n  {_EXAMPLES[name]}"
+        name, help=text, description=text, epilog=f"example:\n  {EXAMPLES[name]}"
     )
     parser.set_defaults(run=run, prog=parser.prog)
     parser.add_argument("--json", action="store_true", help="print one JSON object")

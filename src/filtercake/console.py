@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -17,6 +18,19 @@ SHOWN = 5
 
 Points = Mapping[str, Mapping[str, Point]]
 """Points by study and name."""
+
+
+CHATTER = ("Select jobs to execute", "Execute ")
+"""How lines of the scheduler start that say nothing a reader needs; the progress line says more."""
+
+
+def hush() -> None:
+    """Leave the scheduler's chatter out of the console; Snakemake's own settings do not reach it."""
+    logging.getLogger("snakemake.logging").addFilter(_is_news)
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    return record.levelno > logging.INFO or not str(record.msg).startswith(CHATTER)
 
 
 def plan(points: Points, packings: int) -> str:

@@ -102,10 +102,12 @@ class Progress:
             plan = json.loads(header)
         except (OSError, ValueError):
             return ""
-        done, total = len(ticks), max(int(plan["total"]), len(ticks))
+        done, total = len(ticks), int(plan["total"])
         minutes = max(time.time() - float(plan["started"]), 1e-3) / 60.0
-        left = (total - done) * minutes / done
-        return f"[{done}/{total} packings, {done / minutes:.0f} per minute, {_duration(left)} left] "
+        pace = f"{done / minutes:.0f} per minute"
+        if done > total:  # intervals and calibrations ask for packings as they go
+            return f"[{done} packings, {pace}] "
+        return f"[{done}/{total} packings, {pace}, {_duration((total - done) * minutes / done)} left] "
 
 
 def _duration(minutes: float) -> str:

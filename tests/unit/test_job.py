@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from filtercake import console
 from filtercake.errors import ConfigError, EngineError, PackingRejected, Problem
 from filtercake.job import FAILURE, PROGRESS_VARIABLE, Progress, failure_reason, job
 
@@ -173,7 +174,7 @@ def test_the_time_left_is_in_a_fitting_unit(
     assert f"{left} left] x" in capsys.readouterr().err
 
 
-def test_more_packings_than_planned_do_no_harm(
+def test_beyond_the_plan_nothing_is_foretold(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "progress"
@@ -181,7 +182,7 @@ def test_more_packings_than_planned_do_no_harm(
     Progress.begin(path, 1)
     for _ in range(3):
         Progress().packed("x")
-    assert capsys.readouterr().err.splitlines()[-1].startswith("[3/3 packings")
+    assert capsys.readouterr().err.splitlines()[-1].startswith("[3 packings, ")
 
 
 def test_a_new_run_starts_from_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -222,3 +223,18 @@ def test_processes_at_once_lose_no_count(tmp_path: Path) -> None:
     counts = [int(line.partition("/")[0].lstrip("[")) for line in lines]
     assert len(counts) == 400
     assert max(counts) == 400
+
+
+def test_the_schedulers_chatter_is_left_out() -> None:
+    console.hush()
+    logger = logging.getLogger("snakemake.logging")
+    levels = {
+        "Select jobs to execute...": logging.INFO,
+        "Execute 1 jobs...": logging.INFO,
+        "Building DAG": logging.INFO,
+    }
+    shown = [
+        text for text, level in levels.items() if logger.filter(logger.makeRecord("x", level, "", 0, text, (), None))
+    ]
+    assert shown == ["Building DAG"]
+    assert logger.filter(logger.makeRecord("x", logging.ERROR, "", 0, "Execute failed", (), None))

@@ -52,6 +52,7 @@ def test_friction_and_cohesion_share_their_clouds(finished):
 def test_says_where_the_figures_are_and_how_far_it_is(finished):
     assert "figures in results/tiny/figures" in finished.output
     assert "[10/10 packings" in finished.output
+    assert "Select jobs" not in finished.output and "Execute " not in finished.output
 
 
 def test_a_second_call_does_nothing(finished):

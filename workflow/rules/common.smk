@@ -66,6 +66,7 @@ KNOWN = dict(STUDIES)
 KNOWN_POINTS = dict(POINTS)
 RESULTS = settings.results
 STARTED = time.time()
+console.hush()
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
 
 
