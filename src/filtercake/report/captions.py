@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 from PIL import Image
 
+from filtercake.config import SWEPT
 from filtercake.figures import calibrated, selection
 from filtercake.figures.calibrated import CalibrationData
 from filtercake.figures.catalogue import FOOTER, StudyData
@@ -17,18 +18,17 @@ from filtercake.figures.porosity_cohesion import FREE
 from filtercake.packing.result import publish
 from filtercake.report.pages import engine_names, environment
 from filtercake.report.words import heading, number, with_interval
-from filtercake.study import SWEPT
 
-SUFFIX = ".html.j2"
+SUFFIX, FRONT = ".html.j2", "front"
 
 
-def write_captions(templates: Path, figures: Iterable[Path], values: Mapping[str, Any], target: Path) -> None:
-    """Write one caption per figure, named as the figure.
+def write(templates: Path, figures: Iterable[Path], values: Mapping[str, Any], target: Path) -> None:
+    """Write one caption per figure, named as the figure, and ``front.html`` for the front page.
 
     Parameters
     ----------
     templates : Path
-        Folder of the templates, one per figure.
+        Folder of the templates: one per figure, one per kind of front page.
     figures : iterable of Path
         PNGs; each carries the line that stands below it.
     values : mapping
@@ -37,9 +37,13 @@ def write_captions(templates: Path, figures: Iterable[Path], values: Mapping[str
         Folder of the captions.
     """
     prose = environment(templates)
-    for figure in figures:
-        text = prose.get_template(figure.stem + SUFFIX).render(**values, footer=footer_of(figure))
-        with publish(target / f"{figure.stem}.html") as temporary:
+    texts = {
+        figure.stem: prose.get_template(figure.stem + SUFFIX).render(**values, footer=footer_of(figure))
+        for figure in figures
+    }
+    texts[FRONT] = prose.get_template(f"{FRONT}_{values['kind']}{SUFFIX}").render(**values)
+    for name, text in texts.items():
+        with publish(target / f"{name}.html") as temporary:
             temporary.write_text(text, encoding="utf-8")
 
 
@@ -130,23 +134,20 @@ def _swept(summary: pd.DataFrame) -> dict[str, str]:
 
 def _series(data: StudyData, free: tuple[str, ...], name: str) -> list[dict[str, Any]]:
     """Both ends of every line that varies a property: one line per distribution and value of what else is free."""
+    others = [other for other in free if other != name]
     lines = []
     for csd, rows in selection.varied(data, free, name):
-        others = [other for other in free if other != name]
-        groups = [(None, rows)] if not others else rows.groupby(others[0])
-        for value, line in groups:
-            ordered = line.sort_values(name)
-            if ordered[name].nunique() > 1:
-                ends = [ordered.iloc[0].to_dict(), ordered.iloc[-1].to_dict()]
-                lines.append(
-                    {
-                        "label": selection.label(data, csd),
-                        "of": "" if value is None else f"{value:g}",
-                        "first": {**_point(data, ends[0]), "at": f"{ends[0][name]:g}"},
-                        "last": {**_point(data, ends[1]), "at": f"{ends[1][name]:g}"},
-                    }
-                )
+        for value in sorted(rows[others[0]].unique()) if others else [None]:
+            line = (rows if value is None else rows[rows[others[0]] == value]).sort_values(name)
+            if line[name].nunique() > 1:
+                first, last = ({**_point(data, row), "at": f"{row[name]:g}"} for row in _ends(line))
+                of = "" if value is None else f"{value:g}"
+                lines.append({"label": selection.label(data, csd), "of": of, "first": first, "last": last})
     return lines
+
+
+def _ends(rows: pd.DataFrame) -> list[dict[Any, Any]]:
+    return rows.iloc[[0, -1]].to_dict("records")
 
 
 def _filter(data: StudyData) -> list[dict[str, Any]]:

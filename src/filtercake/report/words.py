@@ -44,7 +44,7 @@ NAMES = {
 }
 """Columns whose names say too little to a reader, without their unit."""
 INTERVAL = "_ci95"
-_UNIT = re.compile(rf"^(?P<name>.+)_(?P<unit>{'|'.join(UNITS)})$")
+_UNIT = re.compile(rf"^(?P<name>.+?)_(?P<unit>{'|'.join(UNITS)})$")
 LARGE, SMALL = 1e5, 1e-3
 """Numbers beyond these are written as multiples of a power of ten."""
 
