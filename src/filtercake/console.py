@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -15,8 +16,16 @@ from filtercake.study import Point
 SHOWN = 5
 """Failed packings listed by name; the rest is in the table."""
 
+CHATTER = ("Select jobs to execute", "Execute ", "Loading script code", "Adding ")
+"""Starts of Snakemake's lines that come again with every job or file; its log keeps them."""
+
 Points = Mapping[str, Mapping[str, Point]]
 """Points by study and name."""
+
+
+def worth_reading(record: logging.LogRecord) -> bool:
+    """Whether a line of Snakemake's says more than that it goes on; warnings and errors always do."""
+    return record.levelno > logging.INFO or not record.getMessage().startswith(CHATTER)
 
 
 def plan(points: Points, packings: int) -> str:

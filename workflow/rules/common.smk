@@ -23,6 +23,11 @@ from filtercake.stability import families as stress_families
 from filtercake.study import expand as expand_points, with_engine
 from filtercake.units import MICROMETRE
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
+
+for handler in logger.handlers:
+    if handler.name == "DefaultStreamHandler":
+        handler.addFilter(console.worth_reading)
 
 ROOT = Path(workflow.basedir)
 CONFIG_FILE = "config/config.yaml"

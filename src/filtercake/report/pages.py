@@ -96,7 +96,7 @@ def failed(packings: pd.DataFrame) -> Content:
     total = words.plural(len(packings), "packing")
     if rows.empty:
         return Content(f"None of {total} failed.")
-    lead = f"{len(rows)} of {total} failed. They are left out of every mean and interval; `make retry` makes them anew."
+    lead = f"{len(rows)} of {total} failed. They are left out of every mean and interval; make retry makes them anew."
     return Content(lead, rows, rows.to_csv(index=False).encode())
 
 

@@ -7,7 +7,7 @@ import re
 
 import pandas as pd
 
-from filtercake.figures.style import power_of_ten, scientific
+from filtercake.figures.style import ENGINES, power_of_ten, scientific
 
 UNITS = {
     "kJ_m3": "kJ/m³",
@@ -123,7 +123,9 @@ def readable(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
     headings = [f"{heading(name)}, ± 95 %" if name in halves else heading(name) for name in shown]
     rows = [
         [
-            with_interval(float(row[name]), float(row[halves[name]])) if name in halves else cell(row[name])
+            with_interval(float(row[name]), float(row[halves[name]]))
+            if name in halves
+            else cell(ENGINES.get(row[name], row[name]) if name == "engine" else row[name])
             for name in shown
         ]
         for row in table.to_dict("records")
