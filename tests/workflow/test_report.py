@@ -16,7 +16,7 @@ from conftest import TINY, Checkout
 from filtercake.report.catalogue import PAGES
 
 WALK = Path(__file__).with_name("walk_report.js")
-NOWHERE = {name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY")}
+NOWHERE = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
 """Makes every request fail: the report needs none."""
 LOADED = re.compile(r"""<(?:script|img|iframe|link)\b[^>]*?\b(?:src|href)=["']?https?:|@import|url\(["']?https?:""")
 HINT_OF_TAILWIND = "cdn.tailwindcss.com should not be used in production"
