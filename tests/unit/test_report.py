@@ -41,6 +41,11 @@ def test_a_value_has_the_digits_that_its_interval_leaves(value: float, half: flo
     assert words.with_interval(value, half, "m/kg" if value > 1.0 else "") == written
 
 
+@pytest.mark.parametrize(("value", "written"), [(75812.0, "75800"), (0.02, "0.02"), (-1.5e-7, "−1.5·10⁻⁷")])
+def test_a_number_is_short(value: float, written: str) -> None:
+    assert words.number(value, 3) == written
+
+
 @pytest.mark.parametrize(
     ("column", "written"),
     [

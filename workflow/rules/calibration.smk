@@ -130,7 +130,7 @@ rule calibration_figure:
     output:
         png=report(
             "{results}/{calibration}/figures/{figure}.png",
-            category="{calibration}",
+            category=calibration_title,
             subcategory="Figures",
             caption="../report/figure.rst",
             labels=figure_labels,

@@ -21,6 +21,10 @@ def figure_labels(wildcards):
     return {"figure": wildcards.figure.replace("_", " ")}
 
 
+def calibration_title(wildcards):
+    return f"Calibration {wildcards.calibration.removeprefix('calibration_')}"
+
+
 def calibrations_reported():
     """Calibrations of the studies in the report."""
     return [

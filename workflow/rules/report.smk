@@ -87,7 +87,7 @@ rule calibration_pages:
         pages=report(
             directory("{results}/{calibration}/report/pages"),
             patterns=["{page}.html"],
-            category="{calibration}",
+            category=calibration_title,
             subcategory=page_part,
             labels=page_labels,
         ),

@@ -188,7 +188,7 @@ def calibration_values(data: CalibrationData) -> dict[str, Any]:
     given = data.measurements
     return {
         "kind": "calibration",
-        "name": data.name,
+        "name": data.name.removeprefix("calibration_"),
         "title": data.title or data.name,
         "counts": packing_counts(data.simulated),
         "estimates": {

@@ -75,7 +75,7 @@ def number(value: float, digits: int = 4) -> str:
         return "–"
     if value and not SMALL <= abs(value) < LARGE:
         return scientific(value, digits).replace("-", "−")
-    return f"{value:.{digits}g}".replace("-", "−")
+    return f"{float(f'{value:.{digits}g}'):g}".replace("-", "−")
 
 
 def with_interval(value: float, half: float, unit: str = "") -> str:
