@@ -3,13 +3,21 @@ VENV ?= .venv
 CORES ?= 2
 STUDIES ?=
 CALIBRATION ?= pmma
+REPORT ?= results/report.html
 BIN := $(VENV)/bin
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
+# calibrations that have been made; the report takes in those of its studies
+MADE := $(patsubst results/calibration_%/calibration.json,%,$(wildcard results/calibration_*/calibration.json))
+CALIBRATIONS ?= $(patsubst config/calibrations/%.yaml,%,$(wildcard $(MADE:%=config/calibrations/%.yaml)))
+comma := ,
+space := $() $()
+JOINED := $(subst $(space),$(comma),$(strip $(CALIBRATIONS)))
+REPORTED := $(if $(STUDIES)$(JOINED),--config $(if $(STUDIES),studies=$(STUDIES)) $(if $(JOINED),calibrations=$(JOINED)))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -22,6 +30,10 @@ run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others)
 
 test: setup lint ## lint, type-check and run the fast tests
 	$(BIN)/pytest
+
+browser: setup ## the report in headless Chromium (installs Debian's chromium where it is missing)
+	@command -v chromium >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium; }
+	$(BIN)/pytest -m browser
 
 test-all: setup lint ## every test, slow ones too
 	$(BIN)/pytest -m ""
@@ -46,6 +58,11 @@ calibrate: setup ## fit the cohesion to measured resistances (CALIBRATION=name o
 
 figures: setup ## redraw the figures
 	$(SNAKEMAKE) $(CONFIG) --forcerun figure
+
+report: setup ## figures, tables, captions, method in one file: results/report.html (STUDIES=a,b REPORT=file.html)
+	$(SNAKEMAKE) report $(REPORTED)
+	$(SNAKEMAKE) report $(REPORTED) --report $(REPORT) --report-stylesheet workflow/report/report.css
+	@echo "report: $(REPORT)"
 
 benchmark: setup ## run time against error: docs/benchmark.md (about 30 min on 2 cores; QUICK=1: a few minutes, docs untouched)
 	$(SNAKEMAKE) benchmark $(if $(QUICK),--config quick=true)

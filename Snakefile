@@ -9,6 +9,7 @@ configfile: "config/config.yaml"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/common_report.smk"
 include: "workflow/rules/csd.smk"
 include: "workflow/rules/packing.smk"
 include: "workflow/rules/resistance.smk"
@@ -16,6 +17,7 @@ include: "workflow/rules/figures.smk"
 include: "workflow/rules/common_calibration.smk"
 include: "workflow/rules/calibration.smk"
 include: "workflow/rules/benchmark.smk"
+include: "workflow/rules/report.smk"
 
 
 rule all:

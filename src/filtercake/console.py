@@ -16,21 +16,16 @@ from filtercake.study import Point
 SHOWN = 5
 """Failed packings listed by name; the rest is in the table."""
 
+CHATTER = ("Select jobs to execute", "Execute ", "Loading script code", "Adding ")
+"""Starts of Snakemake's lines that come again with every job or file; its log keeps them."""
+
 Points = Mapping[str, Mapping[str, Point]]
 """Points by study and name."""
 
 
-CHATTER = ("Select jobs to execute", "Execute ")
-"""How lines of the scheduler start that say nothing a reader needs; the progress line says more."""
-
-
-def hush() -> None:
-    """Leave the scheduler's chatter out of the console; Snakemake's own settings do not reach it."""
-    logging.getLogger("snakemake.logging").addFilter(_is_news)
-
-
-def _is_news(record: logging.LogRecord) -> bool:
-    return record.levelno > logging.INFO or not str(record.msg).startswith(CHATTER)
+def worth_reading(record: logging.LogRecord) -> bool:
+    """Whether a line of Snakemake's says more than that it goes on; warnings and errors always do."""
+    return record.levelno > logging.INFO or not record.getMessage().startswith(CHATTER)
 
 
 def plan(points: Points, packings: int) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 PROJECT = Path(__file__).resolve().parents[2]
-PARTS = ("Snakefile", "config", "workflow", "profiles", "liggghts_templates", "src")
+PARTS = ("Snakefile", "config", "workflow", "profiles", "liggghts_templates", "src", "docs")
 TINY = "config/test/tiny.yaml"
 
 

@@ -13,6 +13,7 @@ from conftest import Checkout, copy_project
 from filtercake.calibration import Parameter
 from filtercake.calibration_config import load_calibration, settings_of
 from filtercake.calibration_study import conclude, summary
+from filtercake.figures.calibrated import with_interval
 
 TINY = "config/test/calibration/tiny.yaml"
 
@@ -78,6 +79,22 @@ def test_rounds_follow_each_other(calibrated: Checkout) -> None:
     simulated = pd.read_csv(folder / "tables" / "simulated.csv")
     assert set(simulated["point"]) == set(visited)
     assert (simulated["engine"] == "embedded").all()
+
+
+def test_its_part_of_the_report_holds_the_outcome(calibrated: Checkout) -> None:
+    folder = calibrated.root / "results" / "calibration_tiny"
+    done = calibrated.snakemake(
+        f"{folder.relative_to(calibrated.root)}/report/pages", "--config", f"calibrations={TINY}"
+    )
+    assert done.returncode == 0, done.stderr + done.stdout
+    record = json.loads((folder / "calibration.json").read_text())
+    front = (folder / "report" / "captions" / "front.html").read_text()
+    value = with_interval(*(record["parameters"]["cohesion_kJ_m3"][key] for key in ("value", "low", "high")))
+    assert value in front and front.count("<li>") == len(record["findings"])
+    figures = {path.stem for path in (folder / "figures").glob("*.png")}
+    assert figures < {path.stem for path in (folder / "report" / "captions").glob("*.html")}
+    pages = {path.stem for path in (folder / "report" / "pages").glob("*.html")}
+    assert pages == {"parity", "predictions", "fits", "compressibility", "table3", "failed", "provenance"}
 
 
 def test_nothing_is_left_to_do(calibrated: Checkout) -> None:

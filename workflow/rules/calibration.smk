@@ -125,18 +125,15 @@ rule calibration_figure:
         files=measurement_files,
         summary="{results}/{calibration}/calibration.json",
         tables=expand("{{results}}/{{calibration}}/tables/{table}.csv", table=TABLES),
-        predictions=lambda wildcards: (
-            [f"{RESULTS}/{wildcards.calibration}/tables/predictions.csv"]
-            if calibration_of(wildcards).model.predict
-            else []
-        ),
+        predictions=prediction_tables,
         library=lambda wildcards: library(calibrated.module_of(wildcards.figure)),
     output:
         png=report(
             "{results}/{calibration}/figures/{figure}.png",
-            category="{calibration}",
+            category=calibration_title,
+            subcategory="Figures",
             caption="../report/figure.rst",
-            labels={"figure": "{figure}"},
+            labels=figure_labels,
         ),
         pdf="{results}/{calibration}/figures/{figure}.pdf",
     log:

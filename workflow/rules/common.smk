@@ -23,6 +23,11 @@ from filtercake.stability import families as stress_families
 from filtercake.study import expand as expand_points, with_engine
 from filtercake.units import MICROMETRE
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
+
+for handler in logger.handlers:
+    if handler.name == "DefaultStreamHandler":
+        handler.addFilter(console.worth_reading)
 
 ROOT = Path(workflow.basedir)
 CONFIG_FILE = "config/config.yaml"
@@ -66,7 +71,6 @@ KNOWN = dict(STUDIES)
 KNOWN_POINTS = dict(POINTS)
 RESULTS = settings.results
 STARTED = time.time()
-console.hush()
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
 
 

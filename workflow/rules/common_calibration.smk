@@ -87,6 +87,29 @@ def calibration_params(wildcards):
     }
 
 
+def prediction_tables(wildcards):
+    """The predictions' table, where the calibration predicts."""
+    has_some = calibration_of(wildcards).model.predict
+    folder = f"{RESULTS}/{wildcards.calibration}/tables"
+    return [f"{folder}/predictions.csv"] if has_some else []
+
+
+def outputs_of_calibration(name):
+    calibration, folder = CALIBRATED[name], f"{RESULTS}/{name}"
+    figures = calibrated.figures_of(
+        bool(calibration.model.predict), calibration.measurements
+    )
+    found = [f"{folder}/calibration.json", f"{folder}/tables/fits.csv"]
+    found += [
+        f"{folder}/figures/{figure}.{suffix}"
+        for figure in figures
+        for suffix in ("png", "pdf")
+    ]
+    if calibration.model.predict:
+        found.append(f"{folder}/tables/predictions.csv")
+    return found
+
+
 def calibration_outputs(wildcards):
     if not CALIBRATED:
         files = (ROOT / "config" / "calibrations").glob("*.yaml")
@@ -94,18 +117,4 @@ def calibration_outputs(wildcards):
             "no calibration is asked for: give --config calibrations=<name> (or calibrations in "
             f"{CONFIG_FILE}); allowed: {', '.join(sorted(file.stem for file in files))}, or the path of a file"
         )
-    found = []
-    for name, calibration in CALIBRATED.items():
-        folder = f"{RESULTS}/{name}"
-        figures = calibrated.figures_of(
-            bool(calibration.model.predict), calibration.measurements
-        )
-        found += [f"{folder}/calibration.json", f"{folder}/tables/fits.csv"]
-        found += [
-            f"{folder}/figures/{figure}.{suffix}"
-            for figure in figures
-            for suffix in ("png", "pdf")
-        ]
-        if calibration.model.predict:
-            found.append(f"{folder}/tables/predictions.csv")
-    return found
+    return [file for name in CALIBRATED for file in outputs_of_calibration(name)]

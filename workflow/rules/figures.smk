@@ -12,9 +12,10 @@ rule figure:
     output:
         png=report(
             "{results}/{study}/figures/{figure}.png",
-            category="{study}",
+            category="Study {study}",
+            subcategory="Figures",
             caption="../report/figure.rst",
-            labels={"figure": "{figure}"},
+            labels=figure_labels,
         ),
         pdf="{results}/{study}/figures/{figure}.pdf",
     log:

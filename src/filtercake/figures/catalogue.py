@@ -22,6 +22,10 @@ if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
     from matplotlib.figure import Figure
 
 
+FOOTER = "Description"
+"""Metadata of a PNG that holds the line below its figure: packings, failures, engine."""
+
+
 @dataclass(frozen=True)
 class StudyData:
     """Everything a figure may show of a study.
@@ -141,11 +145,15 @@ def draw(figure: str, data: StudyData) -> Figure:
 
 
 def save(figure: Figure, png: Path, pdf: Path) -> None:
-    """Save a figure as PNG (300 dpi) and PDF; no date inside, so that the same figure is the same file."""
+    """Save a figure as PNG (300 dpi) and PDF; no date inside, so that the same figure is the same file.
+
+    The PNG carries the line that stands below the figure, for its caption.
+    """
     from filtercake.figures import style
 
+    footer = " ".join(figure.get_supxlabel().split())
     with style.applied():
         with publish(png) as temporary:
-            figure.savefig(temporary, format="png", dpi=300)
+            figure.savefig(temporary, format="png", dpi=300, metadata={FOOTER: footer})
         with publish(pdf) as temporary:
             figure.savefig(temporary, format="pdf", metadata={"CreationDate": None})

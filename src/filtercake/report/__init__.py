@@ -1,0 +1,1 @@
+"""What the report shows beside the figures: captions, readable tables, pages of prose."""

@@ -1,0 +1,101 @@
+"""Which pages a study or calibration has in the report, and what each says before its table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+TABLES, FAILED, PROVENANCE = "Tables", "Failed packings", "Provenance"
+"""Parts of a study in the report."""
+
+
+@dataclass(frozen=True)
+class PageSpec:
+    """A page's part of the report, its title, and what it says before its table.
+
+    Attributes
+    ----------
+    part : str
+        Part of the study that it stands under.
+    title : str
+        Title.
+    lead : str
+        What the table holds.
+    file : str
+        CSV below the study's folder; empty for a page that has none.
+    """
+
+    part: str
+    title: str
+    lead: str = ""
+    file: str = ""
+
+
+INTERVALS = "Intervals are 95 % intervals of the mean over packings from different initial clouds."
+PAGES: dict[str, PageSpec] = {
+    "summary": PageSpec(
+        TABLES,
+        "Summary of all points",
+        "One row per point: porosity of the bed's interior and specific cake resistance by the Kozeny-Carman equation "
+        f"with the full size distribution. {INTERVALS} n counts accepted packings.",
+        "summary.csv",
+    ),
+    "comparison": PageSpec(
+        TABLES,
+        "Comparison with published porosities",
+        "Published porosities from simulations beside ours by the same count. A published value within three standard "
+        "deviations of one packing is no different from ours.",
+        "tables/comparison.csv",
+    ),
+    "table1": PageSpec(
+        TABLES,
+        "Table 1, dimension of the system",
+        "Side of the box that holds the spheres of a packing, for our number of spheres and, where a published value "
+        "is for another number, for that.",
+        "tables/table1.csv",
+    ),
+    "table2": PageSpec(
+        TABLES,
+        "Table 2, size classes in the packing",
+        "What each distribution keeps when rare, small or large classes are left out of the packing.",
+        "tables/table2.csv",
+    ),
+    "table3": PageSpec(
+        TABLES,
+        "Table 3, parameters",
+        "Material and settings of the packings. Where a sweep varies a property, this is its base value.",
+    ),
+    "table4": PageSpec(
+        TABLES,
+        "Table 4, porosity and resistance at the base material",
+        f"Ours beside published simulations and measurements. {INTERVALS}",
+        "tables/table4.csv",
+    ),
+    "crystallizer": PageSpec(
+        TABLES, "Crystallizer", "Its steady state at every residence time.", "tables/crystallizer.csv"
+    ),
+    "filter": PageSpec(
+        TABLES,
+        "Drum filter",
+        "The filter that each point's slurry needs; low and high are the areas at the ends of the resistance's 95 % "
+        "interval.",
+        "tables/filter.csv",
+    ),
+    "parity": PageSpec(
+        TABLES,
+        "Measured and modelled resistances",
+        "Every measurement beside the calibrated model, and beside what the other distributions predict for it.",
+        "tables/parity.csv",
+    ),
+    "predictions": PageSpec(
+        TABLES,
+        "Predictions",
+        "Cakes that were never tested, at the calibrated parameters, with 95 % intervals.",
+        "tables/predictions.csv",
+    ),
+    "fits": PageSpec(TABLES, "Filtration tests", "Resistances fitted to the tests, by both forms.", "tables/fits.csv"),
+    "compressibility": PageSpec(
+        TABLES, "Compressibility", "Power laws of the resistance over pressure.", "tables/compressibility.csv"
+    ),
+    "failed": PageSpec(FAILED, "Failed packings"),
+    "provenance": PageSpec(PROVENANCE, "Provenance"),
+}

@@ -1,0 +1,34 @@
+"""Rule calibration_pages: what the report says and tabulates of a calibration."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.config import Study
+from filtercake.figures.calibrated import CalibrationData
+from filtercake.job import job
+from filtercake.measurements import load_measurements
+from filtercake.packing.result import read_record
+from filtercake.provenance import describe
+from filtercake.report import captions, pages
+
+NAMES = {"csd": str, "point": str}
+
+with job(snakemake.log[0]):
+    folder = Path(snakemake.input.summary).parent
+    tables = {Path(table).stem: pd.read_csv(table, dtype=NAMES) for table in snakemake.input.tables}
+    data = CalibrationData(
+        name=snakemake.wildcards.calibration,
+        title=snakemake.params.title,
+        summary=read_record(Path(snakemake.input.summary)),
+        predictions=next((pd.read_csv(table, dtype=NAMES) for table in snakemake.input.predictions), None),
+        labels=dict(snakemake.params.labels),
+        measurements=load_measurements(Path(snakemake.input.files[0])),
+        **tables,
+    )
+    figures = [Path(figure) for figure in snakemake.input.figures]
+    templates = Path(snakemake.input.front).parent
+    captions.write(templates, figures, captions.calibration_values(data), Path(snakemake.output.captions))
+    study = Study.model_validate(snakemake.params.study)
+    found = pages.contents(folder, data.simulated, study, describe(Path(snakemake.scriptdir).parents[1]))
+    pages.write(Path(snakemake.input.page), found, Path(snakemake.output.pages))
