@@ -87,15 +87,15 @@ class LoadedStudy:
     warnings: tuple[str, ...]
 
 
-def load_workflow(values: dict[str, Any], file: str) -> Workflow:
-    """Check the workflow's own configuration (already parsed by Snakemake).
+def load_workflow(values: Any, file: str) -> Workflow:
+    """Check the workflow's own configuration (already parsed).
 
     Raises
     ------
     ConfigError
         With every problem.
     """
-    for key in ("studies", "calibrations"):
+    for key in ("studies", "calibrations") if isinstance(values, dict) else ():
         if isinstance(values.get(key), str):  # --config studies=a,b
             values = {**values, key: [name.strip() for name in values[key].split(",") if name.strip()]}
     return parse(Workflow, values, file)
