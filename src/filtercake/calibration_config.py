@@ -31,7 +31,7 @@ from filtercake.config import (
 )
 from filtercake.config_loading import LoadedStudy, find_studies, load_study, parse
 from filtercake.csd import CrystalSizeDistribution
-from filtercake.errors import ConfigError, Problem
+from filtercake.errors import ConfigError, Problem, shown
 from filtercake.fence import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
 from filtercake.filtration import CompressibilityFit
 from filtercake.measurements import (
@@ -247,6 +247,9 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
     """
     model = parse(Calibration, read_yaml(path), str(path))
     study = load_study(_study_path(model, path, studies))
+    if not is_file(path.parent / model.measurements):
+        allowed = "no such file; must be the path of a file of measurements, relative to this file"
+        raise ConfigError([Problem(str(path), "measurements", shown(model.measurements), allowed)])
     measurements = load_measurements(path.parent / model.measurements)
     problems = list(_problems(model, study, measurements, path))
     if problems:

@@ -25,8 +25,19 @@ def shown(value: Any) -> str:
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
 
 
+def visible(text: str) -> str:
+    """Write what a terminal would obey, and halves of characters, as escapes; lines and tabs stay."""
+    if all(character.isprintable() or character in "\n\t" for character in text):
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
+
+
 class FiltercakeError(Exception):
     """Base of every error raised on purpose; its text is meant for the user, without a traceback."""
+
+    def __str__(self) -> str:
+        """Return the text, fit for a terminal whatever the files and values it names are called."""
+        return visible(super().__str__())
 
 
 @dataclass(frozen=True)
