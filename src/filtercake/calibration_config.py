@@ -26,6 +26,7 @@ from filtercake.config import (
     Friction,
     Model,
     Name,
+    PathText,
     Sweep,
     Workflow,
 )
@@ -81,8 +82,10 @@ class Calibration(Model):
     """What is fitted to which measurements."""
 
     title: Annotated[str, Field(max_length=120), TO_TEXT] = Field(default="", description="One line for figures.")
-    study: str = Field(description="Study whose distributions, material and packing settings hold: a name or a path.")
-    measurements: str = Field(description="YAML with the measurements; path relative to this file.")
+    study: PathText = Field(
+        description="Study whose distributions, material and packing hold: a name or a path."
+    )
+    measurements: PathText = Field(description="YAML with the measurements; path relative to this file.")
     cohesion_kJ_m3: CohesionRange = Field(  # noqa: N815
         default=CohesionRange(), description="Where the cohesion is looked for."
     )

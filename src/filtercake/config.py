@@ -32,7 +32,7 @@ UNSEEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
 
 FORMULA_STARTS = ("=", "+", "-", "@")
 
-NOT_IN_FOLDERS = "{}"
+NOT_IN_PATHS = "{}"
 """Characters that Snakemake would take for a wildcard."""
 
 LONGEST_NAME = 255
@@ -94,15 +94,15 @@ def _text(value: Any) -> Any:
     return text
 
 
-def _folder(value: Any) -> Any:
-    """Refuse what no folder is called, or Snakemake would not take as it is."""
+def _path(value: Any) -> Any:
+    """Refuse what no file is called, or Snakemake would not take as it is."""
     if not isinstance(value, str):
         return value
     unseen = any(unicodedata.category(character) in UNSEEN for character in value)
-    if unseen or value != value.strip() or set(value) & set(NOT_IN_FOLDERS):
-        raise ValueError("must be the path of a folder, of visible characters without { and }")
+    if unseen or value != value.strip() or set(value) & set(NOT_IN_PATHS):
+        raise ValueError("must be a path of visible characters, without { and }")
     if any(len(part.encode()) > LONGEST_NAME for part in value.split("/")):
-        raise ValueError(f"must be the path of a folder, no part longer than {LONGEST_NAME} bytes")
+        raise ValueError(f"must be a path, no part of it longer than {LONGEST_NAME} bytes")
     return value
 
 
@@ -110,6 +110,7 @@ def _folder(value: Any) -> Any:
 TO_NUMBER = BeforeValidator(_number)
 TO_WHOLE = BeforeValidator(_whole)
 Name = Annotated[str, BeforeValidator(_name)]
+PathText = Annotated[str, Field(min_length=1, max_length=1000), BeforeValidator(_path)]
 TO_TEXT = BeforeValidator(_text)
 LISTED = BeforeValidator(_listed)
 ENTRIES = Field(min_length=1, max_length=MOST_VALUES)
@@ -162,7 +163,7 @@ class Csd(Model):
     mixture: Annotated[list[SizeClass], Field(min_length=1, max_length=MOST_VALUES)] | None = Field(
         default=None, description="Discrete sizes with their volume fractions."
     )
-    file: str | None = Field(
+    file: PathText | None = Field(
         default=None,
         description="CSV with the columns size_um,volume_fraction; path relative to the study file.",
     )
@@ -200,7 +201,7 @@ class Crystallizer(Model):
     """A mixed-suspension, mixed-product-removal crystallizer, whose residence time a sweep may vary."""
 
     kinetics: Name = Field(description="Crystallization kinetics: a preset, or a name in kinetics_file.")
-    kinetics_file: str | None = Field(
+    kinetics_file: PathText | None = Field(
         default=None, description="YAML with kinetics of your own; path relative to the study file."
     )
     slurry_density_kg_m3: Annotated[float, Field(ge=0.001, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
@@ -446,13 +447,11 @@ class Study(Model):
 class Workflow(Model):
     """The workflow's configuration: which studies to run, and where their results go."""
 
-    studies: Annotated[list[str], LISTED, ENTRIES] = Field(
+    studies: Annotated[list[PathText], LISTED, ENTRIES] = Field(
         default=["pmma"], description="Names of files in config/studies, or paths of study files."
     )
-    calibrations: Annotated[list[str], LISTED, Field(max_length=MOST_VALUES)] = Field(
+    calibrations: Annotated[list[PathText], LISTED, Field(max_length=MOST_VALUES)] = Field(
         default=[], description="Names of files in config/calibrations, or paths of calibration files."
     )
-    results: Annotated[str, Field(min_length=1, max_length=1000), BeforeValidator(_folder)] = Field(
-        default="results", description="Folder of the results."
-    )
+    results: PathText = Field(default="results", description="Folder of the results.")
     quick: bool = Field(default=False, description="For the benchmarks: a few packings of each case.")

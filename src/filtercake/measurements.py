@@ -15,7 +15,7 @@ import pandas as pd
 from pydantic import Field, model_validator
 from scipy import special
 
-from filtercake.config import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name
+from filtercake.config import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText
 from filtercake.config_loading import parse
 from filtercake.errors import ConfigError, FiltrationError, Problem
 from filtercake.filtration import (
@@ -109,7 +109,7 @@ class ConstantPressureTest(Model):
         default=None, description="Name in tables and figures; the file's name without its ending if left out."
     )
     csd: Name = Field(description="Name of a distribution of the study.")
-    file: Annotated[str, Field(min_length=1)] = Field(
+    file: PathText = Field(
         description="CSV with a column of times and one of filtrate volumes, units in the header (time_s,volume_mL); "
         "path relative to this file."
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import csv
+import multiprocessing
 import os
 import random
 import sys
 import tempfile
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -61,41 +61,48 @@ class Campaign:
             target.write_bytes(self.before[about.file])
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=10_000, help="inputs, over all kinds (default 10000)")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kind", choices=KINDS, action="append", help="only this kind")
-    parser.add_argument("--output", type=Path, help="write the counts to this CSV")
-    parser.add_argument("--failures", type=Path, help="keep the inputs that came to a bad end in this folder")
-    options = parser.parse_args()
-    output, failures = (path and path.resolve() for path in (options.output, options.failures))
-    kinds = options.kind or KINDS
+def run_part(part: tuple[range, tuple[str, ...], int, Path | None]) -> dict[str, Counter[str]]:
+    """Run the inputs of some numbers, kind after kind in turn, and count the outcomes of each kind."""
+    numbers, kinds, seed, failures = part
     counts: dict[str, Counter[str]] = {kind: Counter() for kind in kinds}
     with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder).resolve() / "scratch", options.seed)
-        for number in range(options.count):
+        campaign = Campaign(Path(folder).resolve() / "scratch", seed)
+        for number in numbers:
             kind = kinds[number % len(kinds)]
             content = campaign.make(kind, number)
-            started = time.process_time()
             outcome, said = campaign.run(kind, content)
             counts[kind][outcome] += 1
-            slow = time.process_time() - started
             if outcome in watching.BAD:
                 print(f"\n{kind} {number}: {outcome}: {said[:1500]}", flush=True)
                 if failures:
                     failures.mkdir(parents=True, exist_ok=True)
                     shown = content if isinstance(content, bytes) else repr(content).encode()
                     (failures / f"{kind.replace(' ', '_')}_{number}").write_bytes(shown)
-            elif slow > 5.0:
-                print(f"{kind} {number}: {outcome} after {slow:.1f} s", flush=True)
         os.chdir("/")
+    return counts
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=10_000, help="inputs, over all kinds (default 10000)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--kind", choices=KINDS, action="append", help="only this kind")
+    parser.add_argument("--output", type=Path, help="write the counts to this CSV")
+    parser.add_argument("--failures", type=Path, help="keep the inputs that came to a bad end in this folder")
+    options = parser.parse_args()
+    kinds, failures = tuple(options.kind or KINDS), options.failures and options.failures.resolve()
+    ends = [options.count * k // options.processes for k in range(options.processes + 1)]
+    parts = [(range(*pair), kinds, options.seed, failures) for pair in zip(ends, ends[1:], strict=False)]
+    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
+        found = pool.map(run_part, parts)
+    counts = {kind: sum((part[kind] for part in found), Counter()) for kind in kinds}
     columns = ("kind", "inputs", *watching.GOOD, *watching.BAD)
     rows = [
-        {"kind": kind, "inputs": found.total(), **{o: found[o] for o in columns[2:]}} for kind, found in counts.items()
+        {"kind": kind, "inputs": of.total(), **{name: of[name] for name in columns[2:]}} for kind, of in counts.items()
     ]
     rows.append({"kind": "all", **{name: sum(row[name] for row in rows) for name in columns[1:]}})
-    for stream in [sys.stdout, *([output.open("w", encoding="utf-8", newline="")] if output else [])]:
+    for stream in [sys.stdout, *([options.output.open("w", encoding="utf-8", newline="")] if options.output else [])]:
         writer = csv.DictWriter(stream, columns, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)

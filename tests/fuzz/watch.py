@@ -83,7 +83,7 @@ class Watch:
     @contextmanager
     def __call__(self, named: Iterable[str] = ()) -> Iterator[None]:
         """Listen for the time of one input; ``named`` are the paths that a user asked for by name."""
-        self.named = tuple(os.path.dirname(os.path.realpath(name)) for name in named)  # noqa: PTH120
+        self.named = tuple(os.path.dirname(os.path.realpath(_writable(name))) for name in named)  # noqa: PTH120
         self.written, self.started, self.on = [], [], True
         try:
             yield
@@ -156,6 +156,11 @@ def outcome_of(
     if found == "refused" and not _clear(said, names):
         return "unclear", said[:2000]
     return found, said
+
+
+def _writable(name: str) -> str:
+    """Return a name as a file system could hold it."""
+    return name.encode("utf-8", "replace").decode()
 
 
 def _clear(said: str, names: tuple[str, ...]) -> bool:
