@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import multiprocessing
 import os
 import random
@@ -93,7 +94,7 @@ def main() -> int:
     options = parser.parse_args()
     kinds, failures = tuple(options.kind or KINDS), options.failures and options.failures.resolve()
     ends = [options.count * k // options.processes for k in range(options.processes + 1)]
-    parts = [(range(*pair), kinds, options.seed, failures) for pair in zip(ends, ends[1:], strict=False)]
+    parts = [(range(*pair), kinds, options.seed, failures) for pair in itertools.pairwise(ends)]
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         found = pool.map(run_part, parts)
     counts = {kind: sum((part[kind] for part in found), Counter()) for kind in kinds}
