@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import csv
 import itertools
+import math
 import multiprocessing
 import os
 import random
 import sys
 import tempfile
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -62,13 +64,15 @@ class Campaign:
             target.write_bytes(self.before[about.file])
 
 
-def run_part(part: tuple[range, tuple[str, ...], int, Path | None]) -> dict[str, Counter[str]]:
+def run_part(part: tuple[range, tuple[str, ...], int, Path | None, float]) -> dict[str, Counter[str]]:
     """Run the inputs of some numbers, kind after kind in turn, and count the outcomes of each kind."""
-    numbers, kinds, seed, failures = part
+    numbers, kinds, seed, failures, end = part
     counts: dict[str, Counter[str]] = {kind: Counter() for kind in kinds}
     with tempfile.TemporaryDirectory() as folder:
         campaign = Campaign(Path(folder).resolve() / "scratch", seed)
         for number in numbers:
+            if time.time() > end:
+                break
             kind = kinds[number % len(kinds)]
             content = campaign.make(kind, number)
             outcome, said = campaign.run(kind, content)
@@ -88,13 +92,15 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=10_000, help="inputs, over all kinds (default 10000)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="stop after this time, whatever is left")
     parser.add_argument("--kind", choices=KINDS, action="append", help="only this kind")
     parser.add_argument("--output", type=Path, help="write the counts to this CSV")
     parser.add_argument("--failures", type=Path, help="keep the inputs that came to a bad end in this folder")
     options = parser.parse_args()
     kinds, failures = tuple(options.kind or KINDS), options.failures and options.failures.resolve()
+    stop = time.time() + 60.0 * options.minutes
     ends = [options.count * k // options.processes for k in range(options.processes + 1)]
-    parts = [(range(*pair), kinds, options.seed, failures) for pair in itertools.pairwise(ends)]
+    parts = [(range(*pair), kinds, options.seed, failures, stop) for pair in itertools.pairwise(ends)]
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         found = pool.map(run_part, parts)
     counts = {kind: sum((part[kind] for part in found), Counter()) for kind in kinds}

