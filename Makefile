@@ -4,6 +4,8 @@ CORES ?= 2
 STUDIES ?=
 CALIBRATION ?= pmma
 REPORT ?= results/report.html
+COUNT ?= 10000
+SEED ?= 1
 BIN := $(VENV)/bin
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
@@ -17,7 +19,7 @@ REPORTED := $(if $(STUDIES)$(JOINED),--config $(if $(STUDIES),studies=$(STUDIES)
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run report browser benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability reference calibrate test test-all lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -101,6 +103,9 @@ bed-size: setup ## several beds of N = 25 000 against one of N = 100 000, alum (
 synthetic: setup ## remake the synthetic filtration tests of config/measurements (about 2 min on 2 cores)
 	$(SNAKEMAKE) results/synthetic_truth/summary.csv --config studies=config/benchmarks/synthetic_truth.yaml
 	$(BIN)/python tests/data/make_measurements.py results/synthetic_truth/summary.csv
+
+fuzz: setup ## spoilt inputs of every kind to the code that reads them: docs/data/fuzz.csv (COUNT=10000 SEED=1)
+	$(BIN)/python tests/fuzz/campaign.py --count $(COUNT) --seed $(SEED) --processes $(CORES) --output docs/data/fuzz.csv
 
 references: setup ## remake the stored LIGGGHTS trajectories that the tests compare the embedded engine with
 	$(BIN)/python tests/data/force_scenes.py

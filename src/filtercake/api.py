@@ -22,6 +22,7 @@ from filtercake.crystallizer import SteadyState
 from filtercake.csd import CrystalSizeDistribution
 from filtercake.drum_filter import DrumFilter, area, cake_mass_per_area, cake_thickness, capacity, medium_share
 from filtercake.errors import ConfigError, FilterError, PackingRejected, Problem
+from filtercake.packing.cloud import NARROW_PARTICLES
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import bed_height
 from filtercake.packing.spec import PackingSpec
@@ -35,7 +36,8 @@ CSD = "csd"
 """Name of the one distribution."""
 CRYSTALLIZER_OPTIONS = ("kinetics", "kinetics_file", "slurry_density_kg_m3", "bin_width_um")
 PLAIN_DENSITY = 1000.0
-"""Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it."""
+"""Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it, or from the spheres
+that a bed of it needs."""
 SLICES_PER_DIAMETER = 20
 LARGEST_RESISTANCE = 1e100
 """m/kg; beyond, squares leave floating point."""
@@ -149,13 +151,13 @@ class PackingPorosity:
 class ResistanceOptions(Model):
     """Arguments of :func:`resistance`, besides the distribution."""
 
-    porosity: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER] = Field(
+    porosity: Annotated[float, Field(ge=0.001, le=0.999, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Porosity of the cake."
     )
     density_kg_m3: Density | None = Field(
         default=None, description="Crystal density, kg/m3; that of the crystallizer's kinetics if left out."
     )
-    sphericity: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
+    sphericity: Annotated[float, Field(ge=0.01, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1.0, description="Sphericity of the crystals."
     )
 
@@ -166,16 +168,16 @@ class FilterOptions(Filter):
     resistance_m_kg: Annotated[float, Field(ge=0, le=1e20, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Specific resistance of the cake, m/kg."
     )
-    slurry_density_kg_m3: Annotated[float, Field(gt=0, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
+    slurry_density_kg_m3: Annotated[float, Field(ge=0.001, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Crystals in the slurry, kg/m3 (= g/L)."
     )
-    slurry_flow_m3_h: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
+    slurry_flow_m3_h: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None, description="Slurry to be filtered, m3/h: gives the area it needs."
     )
-    filter_area_m2: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
+    filter_area_m2: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None, description="Area of a filter, m2, instead of the flow: gives the flow it can take."
     )
-    porosity: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER] | None = Field(
+    porosity: Annotated[float, Field(ge=0.001, le=0.999, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None, description="Porosity of the cake, for its thickness; goes with density_kg_m3."
     )
     density_kg_m3: Density | None = Field(
@@ -213,7 +215,8 @@ def distribution(**options: Any) -> Distribution:
     28.57
     """
     options = {name: value for name, value in options.items() if value is not None}
-    study = load(options, {} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY}, {})
+    material = {} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY}
+    study = load(options, material, {"particles": NARROW_PARTICLES})
     return _distribution(study, options)
 
 

@@ -15,19 +15,23 @@ from filtercake import contact
 from filtercake.calibration import ADVISED_FRICTIONS, Finding, Observation, Parameter, advised_friction
 from filtercake.calibration_study import BATCHES, Candidate, Settings
 from filtercake.config import (
+    MOST_DISTRIBUTIONS,
+    MOST_POINTS,
     NAME,
     TO_NUMBER,
+    TO_TEXT,
     TO_WHOLE,
     Cohesion,
     EngineName,
     Friction,
     Model,
     Name,
+    PathText,
     Sweep,
     Workflow,
 )
-from filtercake.config_loading import LoadedStudy, find_studies, load_study, parse, read_yaml
-from filtercake.errors import ConfigError, Problem
+from filtercake.config_loading import LoadedStudy, find_studies, load_study, parse
+from filtercake.errors import ConfigError, Problem, shown
 from filtercake.fence import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
 from filtercake.filtration import CompressibilityFit
 from filtercake.measurements import (
@@ -42,8 +46,11 @@ from filtercake.measurements import (
 from filtercake.resistance import implied_porosity
 from filtercake.study import ChooseEngine, expand
 from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL
+from filtercake.user_files import is_file, read_yaml
 
-Pressure = Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False), TO_NUMBER]
+Pressure = Annotated[float, Field(ge=0.001, le=10_000, allow_inf_nan=False), TO_NUMBER]
+MOST_FRICTIONS = 50
+"""Coefficients of friction that a calibration packs at."""
 
 
 class CohesionRange(Model):
@@ -51,7 +58,7 @@ class CohesionRange(Model):
 
     low: Cohesion = Field(default=0.0, description="Lowest cohesion energy density, kJ/m3.")
     high: Cohesion = Field(default=100.0, description="Highest cohesion energy density, kJ/m3.")
-    step: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] = Field(
+    step: Annotated[float, Field(ge=1e-6, le=1e7, allow_inf_nan=False), TO_NUMBER] = Field(
         default=5.0, description="Packings are made at multiples of this from low on, kJ/m3."
     )
 
@@ -72,9 +79,9 @@ class CohesionRange(Model):
 class Calibration(Model):
     """What is fitted to which measurements."""
 
-    title: Annotated[str, Field(max_length=120)] = Field(default="", description="One line for figures.")
-    study: str = Field(description="Study whose distributions, material and packing settings hold: a name or a path.")
-    measurements: str = Field(description="YAML with the measurements; path relative to this file.")
+    title: Annotated[str, Field(max_length=120), TO_TEXT] = Field(default="", description="One line for figures.")
+    study: PathText = Field(description="Study whose distributions, material and packing hold: a name or a path.")
+    measurements: PathText = Field(description="YAML with the measurements; path relative to this file.")
     cohesion_kJ_m3: CohesionRange = Field(  # noqa: N815
         default=CohesionRange(), description="Where the cohesion is looked for."
     )
@@ -88,10 +95,10 @@ class Calibration(Model):
         description="Coefficient of friction; advised takes none where the measured resistances imply a mean porosity "
         "under 0.4, and 0.05 above.",
     )
-    fit_friction: Annotated[list[Friction], Field(min_length=3)] | None = Field(
+    fit_friction: Annotated[list[Friction], Field(min_length=3, max_length=MOST_FRICTIONS)] | None = Field(
         default=None, description="Fit the friction too, with packings at these values (at least 3)."
     )
-    rival_friction: list[Friction] | None = Field(
+    rival_friction: Annotated[list[Friction], Field(max_length=MOST_FRICTIONS)] | None = Field(
         default=None,
         description="Other fixed frictions for which the cohesion is fitted too, to compare; [] for none. If left out, "
         "the other one of 0 and 0.05, or the advised one of them, where two or more distributions were measured.",
@@ -107,10 +114,10 @@ class Calibration(Model):
     rounds: Annotated[int, Field(ge=1, le=10), TO_WHOLE] = Field(
         default=4, description="At most so many rounds of packings; later ones are made near the optimum."
     )
-    target_interval: Annotated[float, Field(gt=0, lt=10, allow_inf_nan=False), TO_NUMBER] = Field(
+    target_interval: Annotated[float, Field(ge=1e-4, lt=10, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.1, description="Half-width of the cohesion's 95 % interval, over its value, that ends the rounds."
     )
-    predict: list[Name] = Field(
+    predict: Annotated[list[Name], Field(max_length=MOST_DISTRIBUTIONS)] = Field(
         default=[], description="Distributions of the study, never tested, whose resistance is predicted."
     )
 
@@ -214,7 +221,7 @@ def _path_problem(path: Path, same: Path | None, folder: Path) -> str:
     """Say what is wrong with the path of a calibration; ``same`` is another of its name. Empty where all is well."""
     if not NAME.match(path.stem):
         return "the file's name must be letters, digits, - and _, starting with a letter or digit, at most 64 long"
-    if not path.is_file():
+    if not is_file(path):
         known = sorted(entry.stem for entry in folder.glob("*.yaml"))
         return f"no such calibration; allowed: {', '.join(known)}, or the path of a calibration file"
     if same is not None:
@@ -239,6 +246,9 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
     """
     model = parse(Calibration, read_yaml(path), str(path))
     study = load_study(_study_path(model, path, studies))
+    if not is_file(path.parent / model.measurements):
+        allowed = "no such file; must be the path of a file of measurements, relative to this file"
+        raise ConfigError([Problem(str(path), "measurements", shown(model.measurements), allowed)])
     measurements = load_measurements(path.parent / model.measurements)
     problems = list(_problems(model, study, measurements, path))
     if problems:
@@ -340,7 +350,7 @@ def _measured_doubts(measurements: Measurements, pressure: float | None) -> Iter
 
 def _study_path(model: Calibration, path: Path, studies: Path) -> Path:
     near = path.parent / model.study
-    if model.study.endswith((".yaml", ".yml")) and near.is_file():
+    if model.study.endswith((".yaml", ".yml")) and is_file(near):
         return near
     try:
         return find_studies(Workflow(studies=[model.study]), studies, str(path))[0]
@@ -350,6 +360,12 @@ def _study_path(model: Calibration, path: Path, studies: Path) -> Path:
 
 def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements, path: Path) -> Iterable[Problem]:
     known = ", ".join(study.csds)
+    packed = len({*model.predict, *(item.csd for item in measurements.measurements)})
+    frictions = len(model.fit_friction or [0, *(model.rival_friction or [0])])
+    points = packed * len(model.cohesion_kJ_m3.values()) * frictions * BATCHES
+    if points > MOST_POINTS:
+        allowed = f"must be at most {MOST_POINTS} points: use a larger step, fewer frictions or distributions"
+        yield Problem(str(path), "cohesion_kJ_m3.step", f"{points} points", allowed)
     for item in measurements.measurements:
         if item.csd not in study.csds:
             yield Problem(

@@ -18,7 +18,7 @@ from filtercake import __version__, api, bed, export
 from filtercake import cli_options as words
 from filtercake.config import Material, Packing
 from filtercake.csd import to_table
-from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected
+from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
 from filtercake.packing.result import publish
 from filtercake.precision import half_width
 from filtercake.units import MICROMETRE
@@ -343,7 +343,7 @@ def _mean(values: list[float]) -> tuple[float, float]:
 
 
 def _complain(text: str, status: int = USER_ERROR) -> int:
-    print(f"filtercake: {' '.join(text.split())}", file=sys.stderr)
+    print(f"filtercake: {' '.join(visible(text).split())}", file=sys.stderr)
     return status
 
 

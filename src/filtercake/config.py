@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from filtercake import fence
 from filtercake.fence import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
-from filtercake.units import MICROMETRE, MICROSECOND
+from filtercake.units import MICROMETRE, MICROSECOND, NUMBER
 
 SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
 """Properties a sweep may vary, besides the distribution."""
@@ -23,15 +24,40 @@ NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 """What a study or a distribution may be called: it names files and folders."""
 
 
+LARGEST_INTEGER = 10**18
+"""Whole numbers beyond this fit neither the arrays nor the programs they go to."""
+
+UNSEEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
+"""Unicode categories of what cannot be seen: control and format characters, halves of characters, line ends."""
+
+FORMULA_STARTS = ("=", "+", "-", "@")
+
+NOT_IN_PATHS = "{}"
+"""Characters that Snakemake would take for a wildcard."""
+
+LONGEST_NAME = 255
+"""Bytes of a file's or folder's name that file systems allow."""
+
+MOST_POINTS = 10_000
+"""Points of a study; each is a job of its own."""
+MOST_PARTICLES = 2_000_000
+"""Spheres of a packing."""
+MOST_DISTRIBUTIONS = 200
+"""Distributions of a study, the crystallizer's products among them."""
+MOST_VALUES = 1000
+"""Entries of a list."""
+
+
 def _number(value: Any) -> Any:
-    """Accept what YAML 1.1 reads as text (1e5, 5e-1); refuse booleans."""
+    """Accept what YAML 1.1 reads as text (1e5, 5e-1); refuse booleans, and whole numbers that are no floats."""
     if isinstance(value, bool):
         raise ValueError("must be a number, not true/false")
     if isinstance(value, str):
-        try:
-            return float(value)
-        except ValueError:
-            raise ValueError("must be a number (with a decimal point)") from None
+        if not NUMBER.fullmatch(value.strip()):
+            raise ValueError("must be a number (with a decimal point)")
+        return float(value)
+    if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        raise ValueError(f"must be between -{LARGEST_INTEGER:g} and {LARGEST_INTEGER:g}")
     return value
 
 
@@ -54,21 +80,52 @@ def _name(value: Any) -> Any:
     return value
 
 
+def _text(value: Any) -> Any:
+    """Take away the blanks around a text; refuse what would break a line, a figure or a table that shows it."""
+    if not isinstance(value, str):
+        return value
+    text = value.strip()
+    if any(unicodedata.category(character) in UNSEEN for character in text):
+        raise ValueError("must be one line of visible characters")
+    if "$" in text:
+        raise ValueError("must not hold $, which starts a formula in figures")
+    if text.startswith(FORMULA_STARTS):
+        raise ValueError(f"must not start with {' or '.join(FORMULA_STARTS)}, which start a formula in spreadsheets")
+    return text
+
+
+def _path(value: Any) -> Any:
+    """Refuse what no file is called, or Snakemake would not take as it is."""
+    if not isinstance(value, str):
+        return value
+    unseen = any(unicodedata.category(character) in UNSEEN for character in value)
+    if unseen or value != value.strip() or set(value) & set(NOT_IN_PATHS):
+        raise ValueError("must be a path of visible characters, without { and }")
+    if any(len(part.encode()) > LONGEST_NAME for part in value.split("/")):
+        raise ValueError(f"must be a path, no part of it longer than {LONGEST_NAME} bytes")
+    return value
+
+
 # the bounds stand before the conversion, or they are lost from the JSON schema
 TO_NUMBER = BeforeValidator(_number)
 TO_WHOLE = BeforeValidator(_whole)
-Number = Annotated[float, Field(allow_inf_nan=False), TO_NUMBER]
 Name = Annotated[str, BeforeValidator(_name)]
+PathText = Annotated[str, Field(min_length=1, max_length=1000), BeforeValidator(_path)]
+TO_TEXT = BeforeValidator(_text)
+LISTED = BeforeValidator(_listed)
+ENTRIES = Field(min_length=1, max_length=MOST_VALUES)
 
-Density = Annotated[float, Field(gt=0, le=fence.LARGEST_DENSITY, allow_inf_nan=False), TO_NUMBER]
+Density = Annotated[float, Field(ge=1, le=fence.LARGEST_DENSITY, allow_inf_nan=False), TO_NUMBER]
 YoungsModulus = Annotated[float, Field(ge=0.5, le=100_000, allow_inf_nan=False), TO_NUMBER]
 PoissonRatio = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER]
-Restitution = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER]
+Restitution = Annotated[float, Field(ge=0.001, lt=1, allow_inf_nan=False), TO_NUMBER]
 Friction = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False), TO_NUMBER]
-Cohesion = Annotated[float, Field(ge=0, allow_inf_nan=False), TO_NUMBER]
+Cohesion = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False), TO_NUMBER]
 
-TruncationSize = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False), TO_NUMBER]
-ResidenceTime = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False), TO_NUMBER]
+TruncationSize = Annotated[float, Field(ge=0.001, le=100_000, allow_inf_nan=False), TO_NUMBER]
+ResidenceTime = Annotated[float, Field(ge=0.001, le=100_000, allow_inf_nan=False), TO_NUMBER]
+
+PublishedValue = Annotated[float, Field(ge=0, le=1e20, allow_inf_nan=False), TO_NUMBER]
 
 EngineName = Literal["auto", "liggghts", "embedded", "liggghts_as_published"]
 
@@ -88,11 +145,11 @@ class SizeClass(Model):
     """One size of a mixture."""
 
     size_um: Annotated[
-        float, Field(gt=0, le=100_000, description="Crystal diameter, um.", allow_inf_nan=False), TO_NUMBER
+        float, Field(ge=0.001, le=100_000, description="Crystal diameter, um.", allow_inf_nan=False), TO_NUMBER
     ]
     volume_fraction: Annotated[
         float,
-        Field(gt=0, le=1, description="Its share of the crystal volume (= mass).", allow_inf_nan=False),
+        Field(ge=1e-12, le=1, description="Its share of the crystal volume (= mass).", allow_inf_nan=False),
         TO_NUMBER,
     ]
 
@@ -100,13 +157,13 @@ class SizeClass(Model):
 class Csd(Model):
     """A crystal size distribution: a mixture of discrete sizes, a CSV file, or the crystallizer's product."""
 
-    label: Annotated[str, Field(max_length=60)] | None = Field(
+    label: Annotated[str, Field(max_length=60), TO_TEXT] | None = Field(
         default=None, description="Name in figures and tables; the key if left out."
     )
-    mixture: Annotated[list[SizeClass], Field(min_length=1)] | None = Field(
+    mixture: Annotated[list[SizeClass], Field(min_length=1, max_length=MOST_VALUES)] | None = Field(
         default=None, description="Discrete sizes with their volume fractions."
     )
-    file: str | None = Field(
+    file: PathText | None = Field(
         default=None,
         description="CSV with the columns size_um,volume_fraction; path relative to the study file.",
     )
@@ -144,16 +201,16 @@ class Crystallizer(Model):
     """A mixed-suspension, mixed-product-removal crystallizer, whose residence time a sweep may vary."""
 
     kinetics: Name = Field(description="Crystallization kinetics: a preset, or a name in kinetics_file.")
-    kinetics_file: str | None = Field(
+    kinetics_file: PathText | None = Field(
         default=None, description="YAML with kinetics of your own; path relative to the study file."
     )
-    slurry_density_kg_m3: Annotated[float, Field(gt=0, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
+    slurry_density_kg_m3: Annotated[float, Field(ge=0.001, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Crystals in the slurry, kg/m3 (= g/L)."
     )
-    slurry_flow_m3_h: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(
+    slurry_flow_m3_h: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(
         default=20.0, description="Slurry that leaves the crystallizer, m3/h; times the residence time, its volume."
     )
-    bin_width_um: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False), TO_NUMBER] = Field(
+    bin_width_um: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False), TO_NUMBER] = Field(
         default=5.0, description="Width of the size classes, um (rounded to a whole number of classes)."
     )
     truncate_below_volume_fraction: Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER] = Field(
@@ -175,19 +232,19 @@ class Crystallizer(Model):
 class Filter(Model):
     """The rotary drum filter that the crystallizer's slurry goes to."""
 
-    pressure_drop_kPa: Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
+    pressure_drop_kPa: Annotated[float, Field(ge=0.001, le=10_000, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
         description="Pressure drop across cake and medium, kPa."
     )
-    submerged_fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER] = Field(
+    submerged_fraction: Annotated[float, Field(ge=0.001, lt=1, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Fraction of the drum that is immersed."
     )
-    rotation_rate_rpm: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False), TO_NUMBER] = Field(
+    rotation_rate_rpm: Annotated[float, Field(ge=1e-6, le=100, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Rotation rate of the drum, 1/min."
     )
     medium_resistance_1_m: Annotated[float, Field(ge=0, le=1e15, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Resistance of the filter medium, 1/m."
     )
-    viscosity_mPa_s: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
+    viscosity_mPa_s: Annotated[float, Field(ge=0.001, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
         default=1.0, description="Viscosity of the filtrate, mPa s."
     )
     liquid_density_kg_m3: Density = Field(default=1000.0, description="Density of the filtrate, kg/m3.")
@@ -204,7 +261,7 @@ class Material(Model):
     restitution: Restitution = Field(default=0.3, description="Coefficient of restitution.")
     friction: Friction = Field(default=0.0, description="Coefficient of friction.")
     cohesion_kJ_m3: Cohesion = Field(default=50.0, description="Cohesion energy density, kJ/m3.")  # noqa: N815
-    sphericity: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
+    sphericity: Annotated[float, Field(ge=0.01, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1.0, description="Sphericity in the resistance law; packings are of spheres."
     )
 
@@ -219,7 +276,7 @@ class Material(Model):
 class Packing(Model):
     """How the packings are made."""
 
-    particles: Annotated[int, Field(ge=50, le=2_000_000), TO_WHOLE] | None = Field(
+    particles: Annotated[int, Field(ge=50, le=MOST_PARTICLES), TO_WHOLE] | None = Field(
         default=None,
         description=(
             "Spheres in one packing; if left out, 2000, or as many as make a bed of a broad distribution deep enough "
@@ -239,14 +296,16 @@ class Packing(Model):
     settling_velocity_m_s: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.01, description="Initial downward speed of the spheres, m/s."
     )
-    time_step_rayleigh: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False), TO_NUMBER] | None = Field(
+    time_step_rayleigh: (
+        Annotated[float, Field(ge=fence.SMALLEST_TIME_STEP, lt=1, allow_inf_nan=False), TO_NUMBER] | None
+    ) = Field(
         default=None,
         description=(
             "Time step over the Rayleigh time step of the smallest sphere; "
             f"{FRICTIONLESS_TIME_STEP:g} without friction and {FRICTIONAL_TIME_STEP:g} with it if left out."
         ),
     )
-    time_step_us: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] | None = Field(
+    time_step_us: Annotated[float, Field(ge=1e-9, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None, description="Time step, us; overrides time_step_rayleigh."
     )
     replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] = Field(
@@ -261,20 +320,22 @@ class Packing(Model):
         default=64, description="Packings per point after which porosity_interval gives up, and says so."
     )
     engine: EngineName = Field(default="auto", description="auto takes the best engine on this machine; or name one.")
-    seed: Annotated[int, Field(ge=0), TO_WHOLE] = Field(default=1, description="Base seed of all random numbers.")
-    porosity_tolerance: Annotated[float, Field(gt=0, le=0.01, allow_inf_nan=False), TO_NUMBER] = Field(
+    seed: Annotated[int, Field(ge=0, le=LARGEST_INTEGER), TO_WHOLE] = Field(
+        default=1, description="Base seed of all random numbers."
+    )
+    porosity_tolerance: Annotated[float, Field(ge=1e-9, le=0.01, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1e-4, description="The bed is at rest when its porosity falls by less than this per check."
     )
     max_fall_times: Annotated[float, Field(ge=1, le=100, allow_inf_nan=False), TO_NUMBER] = Field(
         default=4.0, description="Unsettled after this many free-fall times of the highest sphere."
     )
-    skin_um: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] | None = Field(
+    skin_um: Annotated[float, Field(ge=1e-5, le=100_000, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None, description="Neighbour skin, um; the engine chooses if left out."
     )
     processes: Annotated[int, Field(ge=0, le=256), TO_WHOLE] = Field(
         default=0, description="MPI processes of one packing; 0 chooses by size."
     )
-    time_limit_min: Annotated[float, Field(gt=0, allow_inf_nan=False), TO_NUMBER] = Field(
+    time_limit_min: Annotated[float, Field(ge=0.001, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(
         default=240.0, description="Wall-clock limit of one packing, min."
     )
     write_vtk: bool = Field(default=False, description="Keep pictures of the settling for ParaView.")
@@ -295,26 +356,26 @@ class Packing(Model):
 class Sweep(Model):
     """One block of points: every combination of the values given; what is left out keeps its base value."""
 
-    csd: Annotated[list[Name], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+    csd: Annotated[list[Name], LISTED, ENTRIES] | None = Field(
         default=None, description="Names of distributions from csds."
     )
-    residence_time_min: Annotated[list[ResidenceTime], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+    residence_time_min: Annotated[list[ResidenceTime], LISTED, ENTRIES] | None = Field(
         default=None, description="Residence times of the crystallizer, min, instead of csd."
     )
-    cohesion_kJ_m3: Annotated[list[Cohesion], BeforeValidator(_listed), Field(min_length=1)] | None = Field(  # noqa: N815
+    cohesion_kJ_m3: Annotated[list[Cohesion], LISTED, ENTRIES] | None = Field(  # noqa: N815
         default=None, description="Cohesion energy densities, kJ/m3."
     )
-    friction: Annotated[list[Friction], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+    friction: Annotated[list[Friction], LISTED, ENTRIES] | None = Field(
         default=None, description="Coefficients of friction."
     )
-    poisson_ratio: Annotated[list[PoissonRatio], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+    poisson_ratio: Annotated[list[PoissonRatio], LISTED, ENTRIES] | None = Field(
         default=None, description="Poisson's ratios."
     )
-    restitution: Annotated[list[Restitution], BeforeValidator(_listed), Field(min_length=1)] | None = Field(
+    restitution: Annotated[list[Restitution], LISTED, ENTRIES] | None = Field(
         default=None, description="Coefficients of restitution."
     )
     youngs_modulus_MPa: (  # noqa: N815
-        Annotated[list[YoungsModulus], BeforeValidator(_listed), Field(min_length=1)] | None
+        Annotated[list[YoungsModulus], LISTED, ENTRIES] | None
     ) = Field(default=None, description="Young's moduli, MPa.")
     replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] | None = Field(
         default=None, description="Packings per point of this block, instead of packing.replicates."
@@ -340,19 +401,19 @@ class Published(Model):
         "filter_area_m2",
         "medium_share",
     ] = Field(description="What was published.")
-    value: Number = Field(description="The value, in the unit its name says.")
-    source: Annotated[str, Field(max_length=80)] = Field(description="Where it is from, for the legend.")
+    value: PublishedValue = Field(description="The value, in the unit its name says.")
+    source: Annotated[str, Field(max_length=80), TO_TEXT] = Field(description="Where it is from, for the legend.")
     kind: Literal["simulation", "measurement"] = Field(description="Simulated or measured.")
     cohesion_kJ_m3: Cohesion | None = Field(default=None, description="At this cohesion, kJ/m3.")  # noqa: N815
     friction: Friction | None = Field(default=None, description="At this friction.")
     kinetics: Name | None = Field(
         default=None, description="Of the product of these kinetics; not shown beside crystals of others."
     )
-    particles: Annotated[int, Field(ge=1), TO_WHOLE] | None = Field(
+    particles: Annotated[int, Field(ge=1, le=LARGEST_INTEGER), TO_WHOLE] | None = Field(
         default=None, description="For this number of spheres (system_dimension_um), if not the study's."
     )
-    low: Number | None = Field(default=None, description="Lower end, where only a range is known.")
-    high: Number | None = Field(default=None, description="Upper end, where only a range is known.")
+    low: PublishedValue | None = Field(default=None, description="Lower end, where only a range is known.")
+    high: PublishedValue | None = Field(default=None, description="Upper end, where only a range is known.")
 
     @model_validator(mode="after")
     def _range(self) -> Published:
@@ -365,24 +426,32 @@ class Published(Model):
 class Study(Model):
     """A parameter study: distributions, material, packing settings and the points to visit."""
 
-    title: Annotated[str, Field(max_length=120)] = Field(default="", description="One line for figures and reports.")
-    csds: dict[Name, Csd] = Field(default={}, description="The distributions by name.")
+    title: Annotated[str, Field(max_length=120), TO_TEXT] = Field(
+        default="", description="One line for figures and reports."
+    )
+    csds: Annotated[dict[Name, Csd], Field(max_length=MOST_DISTRIBUTIONS)] = Field(
+        default={}, description="The distributions by name."
+    )
     crystallizer: Crystallizer | None = Field(default=None, description="Where the crystals come from.")
     filter: Filter | None = Field(default=None, description="Where the slurry goes; needs a crystallizer.")
     material: Material = Field(description="The crystals.")
     packing: Packing = Field(default=Packing(), description="How the packings are made.")
-    sweeps: Annotated[list[Sweep], Field(min_length=1)] = Field(description="Blocks of points; their union is visited.")
-    published: list[Published] = Field(default=[], description="Published values to show beside ours.")
+    sweeps: Annotated[list[Sweep], Field(min_length=1, max_length=MOST_VALUES)] = Field(
+        description="Blocks of points; their union is visited."
+    )
+    published: Annotated[list[Published], Field(max_length=MOST_VALUES)] = Field(
+        default=[], description="Published values to show beside ours."
+    )
 
 
 class Workflow(Model):
     """The workflow's configuration: which studies to run, and where their results go."""
 
-    studies: Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)] = Field(
+    studies: Annotated[list[PathText], LISTED, ENTRIES] = Field(
         default=["pmma"], description="Names of files in config/studies, or paths of study files."
     )
-    calibrations: Annotated[list[str], BeforeValidator(_listed)] = Field(
+    calibrations: Annotated[list[PathText], LISTED, Field(max_length=MOST_VALUES)] = Field(
         default=[], description="Names of files in config/calibrations, or paths of calibration files."
     )
-    results: Annotated[str, Field(min_length=1)] = Field(default="results", description="Folder of the results.")
+    results: PathText = Field(default="results", description="Folder of the results.")
     quick: bool = Field(default=False, description="For the benchmarks: a few packings of each case.")

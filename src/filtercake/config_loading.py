@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
 from filtercake import contact, fence
 from filtercake.config import (
+    MOST_DISTRIBUTIONS,
+    MOST_PARTICLES,
+    MOST_POINTS,
     NAME,
     SWEPT,
     Crystallizer,
@@ -24,12 +27,14 @@ from filtercake.config import (
 )
 from filtercake.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.csd import CrystalSizeDistribution, mixture, read_csd, truncate
-from filtercake.errors import ConfigError, CrystallizerError, CsdError, Problem
+from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, shown
+from filtercake.packing.cloud import bed_for
 from filtercake.products import resolve, slurry_problems
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
+from filtercake.user_files import is_file, read_yaml
 
-LARGEST_FILE = 1_000_000
-"""Bytes of a configuration file beyond which it is surely not one."""
+MOST_PROBLEMS = 1000
+"""Problems of a file that are looked into."""
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -82,15 +87,15 @@ class LoadedStudy:
     warnings: tuple[str, ...]
 
 
-def load_workflow(values: dict[str, Any], file: str) -> Workflow:
-    """Check the workflow's own configuration (already parsed by Snakemake).
+def load_workflow(values: Any, file: str) -> Workflow:
+    """Check the workflow's own configuration (already parsed).
 
     Raises
     ------
     ConfigError
         With every problem.
     """
-    for key in ("studies", "calibrations"):
+    for key in ("studies", "calibrations") if isinstance(values, dict) else ():
         if isinstance(values.get(key), str):  # --config studies=a,b
             values = {**values, key: [name.strip() for name in values[key].split(",") if name.strip()]}
     return parse(Workflow, values, file)
@@ -112,7 +117,7 @@ def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
         key = f"studies[{index}]"
         if not NAME.match(path.stem):
             problems.append(Problem(file, key, repr(study), "a study's file name must be letters, digits, - and _"))
-        elif not path.is_file():
+        elif not is_file(path):
             allowed = f"no such study; allowed: {', '.join(known)}, or the path of a study file"
             problems.append(Problem(file, key, repr(study), allowed + _did_you_mean(study, known)))
         elif path.stem in [other.stem for other in paths]:
@@ -151,6 +156,9 @@ def check_study(values: Any, path: Path) -> LoadedStudy:
     """
     model = parse(Study, values, str(path))
     model, kinetics, remarks = resolve(model, path)
+    problems = list(_size_problems(model, str(path)))
+    if problems:  # nothing that is too large is looked into
+        raise ConfigError(problems)
     problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
     csds: dict[str, LoadedCsd] = {}
     for name, csd in model.csds.items():
@@ -159,6 +167,7 @@ def check_study(values: Any, path: Path) -> LoadedStudy:
         except (CsdError, CrystallizerError) as error:
             problems.append(Problem(str(path), *_source_of(name, csd), str(error)))
     problems += _stability_problems(model, csds, str(path))
+    problems += _bed_problems(model, csds, str(path))
     if problems:
         raise ConfigError(problems)
     return LoadedStudy(path.stem, path, model, csds, (*remarks, *_doubts(model, csds, str(path))))
@@ -184,55 +193,6 @@ def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
     return studies
 
 
-def read_yaml(path: Path) -> Any:
-    """Parse a YAML file without tags, aliases that multiply, or surprises.
-
-    Raises
-    ------
-    ConfigError
-        If it cannot be read or is not YAML.
-    """
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise ConfigError([Problem(str(path), "(file)", f"{path.stat().st_size} bytes", "at most 1 MB")])
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise ConfigError([Problem(str(path), "(file)", "", f"cannot be read: {error.strerror}")]) from None
-    except UnicodeDecodeError:
-        raise ConfigError([Problem(str(path), "(file)", "", "must be UTF-8 text")]) from None
-    try:
-        return yaml.load(text, Loader=_Loader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "(file)"
-        raise ConfigError([Problem(str(path), where, "", f"not valid YAML: {error.problem}")]) from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise ConfigError([Problem(str(path), "(file)", "", f"not valid YAML: {error}")]) from None
-
-
-class _Loader(yaml.SafeLoader):
-    """Safe YAML without aliases (they can multiply a small file into a huge one) and without doubled keys."""
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()  # type: ignore[no-untyped-call]
-            raise yaml.composer.ComposerError(None, None, "aliases (*name) are not allowed here", event.start_mark)
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[Any] = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if isinstance(key, (list, dict)):
-                raise yaml.constructor.ConstructorError(None, None, "keys must be plain text", key_node.start_mark)
-            if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {key!r} stands twice", key_node.start_mark
-                )
-            seen.add(key)
-        return super().construct_mapping(node, deep)
-
-
 def parse(model: type[M], values: Any, file: str) -> M:
     """Check the values of a YAML file against its model.
 
@@ -241,7 +201,7 @@ def parse(model: type[M], values: Any, file: str) -> M:
     model : type of BaseModel
         What the file must be.
     values : Any
-        What :func:`read_yaml` returned.
+        What :func:`~filtercake.user_files.read_yaml` returned.
     file : str
         Its name, for messages.
 
@@ -251,17 +211,19 @@ def parse(model: type[M], values: Any, file: str) -> M:
         With every problem.
     """
     if not isinstance(values, dict):
-        raise ConfigError([Problem(file, "(file)", _shown(values), "must be a mapping of keys to values")])
+        raise ConfigError([Problem(file, "(file)", shown(values), "must be a mapping of keys to values")])
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise ConfigError([_problem(model, item, file) for item in error.errors()]) from None
+        found = error.errors(include_url=False)
+        raise ConfigError([_problem(model, item, file) for item in found[:MOST_PROBLEMS]]) from None
 
 
 def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
     location = [part for part in item["loc"] if part != "[key]"]
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".") or "(file)"
-    value, message = _shown(item["input"]), item["msg"].removeprefix("Value error, ")
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{_plain(part)}" for part in location)
+    key = key.lstrip(".") or "(file)"
+    value, message = shown(item["input"]), item["msg"].removeprefix("Value error, ")
     if item["type"] == "extra_forbidden":
         allowed = _allowed_keys(model, location[:-1])
         message = f"unknown key; allowed here: {', '.join(allowed)}{_did_you_mean(str(location[-1]), allowed)}"
@@ -275,6 +237,11 @@ def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
     elif " should " in message:
         message = "must " + message.partition(" should ")[2]
     return Problem(file, key, value, message)
+
+
+def _plain(word: str) -> str:
+    """Write a key as it is, or as a short literal where it would spoil the message."""
+    return word if word.isprintable() and len(word) <= LONGEST_SHOWN else shown(word)
 
 
 def _allowed_keys(model: type[BaseModel], location: list[Any]) -> list[str]:
@@ -294,11 +261,6 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _did_you_mean(word: str, known: Iterable[str]) -> str:
@@ -330,6 +292,32 @@ def _load_csd(
         full = mixture([c.size_um * MICROMETRE for c in classes], [c.volume_fraction for c in classes])
     truncated = truncate(full, **csd.truncation).csd
     return LoadedCsd(full, truncated, csd.label or name, file, state)
+
+
+def _size_problems(model: Study, file: str) -> Iterable[Problem]:
+    """Studies with more points or distributions than can be handled."""
+    points = sum(
+        len(sweep.csd or []) * math.prod(len(getattr(sweep, name) or [0]) for name in SWEPT) for sweep in model.sweeps
+    )
+    if points > MOST_POINTS:
+        yield Problem(file, "sweeps", f"{points} points", f"must be at most {MOST_POINTS} points; make several studies")
+    if len(model.csds) > MOST_DISTRIBUTIONS:
+        allowed = f"must be at most {MOST_DISTRIBUTIONS}, the crystallizer's products among them; make several studies"
+        yield Problem(file, "csds", f"{len(model.csds)} distributions", allowed)
+
+
+def _bed_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterable[Problem]:
+    """Swept distributions so broad that a deep enough bed holds too many spheres."""
+    if model.packing.particles is not None:
+        return
+    for name in dict.fromkeys(name for sweep in model.sweeps for name in sweep.csd or [] if name in csds):
+        needed = bed_for(csds[name].truncated, model.packing.void_fraction).particles
+        if needed > MOST_PARTICLES:
+            allowed = (
+                f"needs {needed:.3g} spheres for a deep enough bed; at most {MOST_PARTICLES} are possible: leave "
+                "small crystals out of the packing (truncate_below_um), or give packing.particles"
+            )
+            yield Problem(file, *_source_of(name, model.csds[name]), allowed)
 
 
 def _reference_problems(model: Study, file: str) -> Iterable[Problem]:

@@ -9,20 +9,19 @@ from __future__ import annotations
 
 import difflib
 import math
-import reprlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
 from scipy.special import gammainc
 
-from filtercake.csd import CrystalSizeDistribution, discretise
-from filtercake.errors import CrystallizerError, Problem
+from filtercake.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
+from filtercake.errors import ConfigError, CrystallizerError, Problem, shown
 from filtercake.units import MICROMETRE, MINUTE, FloatArray
+from filtercake.user_files import read_yaml
 
 PRESETS: Final = Path(__file__).parent / "data" / "kinetics.yaml"
 """The kinetics that come with the package."""
@@ -35,9 +34,6 @@ BIN_WIDTH: Final = 5.0 * MICROMETRE
 
 UPPER_SCALES: Final = 15.0
 """Largest size considered, in size scales: all but 2e-4 of the crystal volume is below it."""
-
-MOST_CLASSES: Final = 100_000
-"""Size classes beyond which the size scale or the bin width is surely in the wrong unit."""
 
 LARGEST_LOGARITHM: Final = 690.0
 """Natural logarithms beyond this do not fit a floating-point number."""
@@ -487,16 +483,16 @@ _OPTIONAL: Final = frozenset({"residence_time_range_min"})
 def _read_mapping(file: Path) -> dict[Any, Any]:
     """Parse a kinetics file down to its entries."""
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise CrystallizerError(f"{file}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise CrystallizerError(f"{file}: must be UTF-8 text") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise CrystallizerError(f"{file}: not valid YAML: {' '.join(str(error).split())}") from None
+        content = read_yaml(file)
+    except ConfigError as error:
+        raise CrystallizerError("\n".join(f"{file}: {_said(problem)}" for problem in error.problems)) from None
     if not isinstance(content, dict) or not content:
         raise CrystallizerError(f"{file}: holds no kinetics; must be a mapping of names to {', '.join(_ATTRIBUTES)}")
     return content
+
+
+def _said(problem: Problem) -> str:
+    return problem.allowed if problem.key == "(file)" else f"{problem.key}: {problem.allowed}"
 
 
 def _read_entry(name: Any, entry: Any, file: str) -> tuple[dict[str, Any], list[Problem]]:
@@ -532,10 +528,5 @@ def _unknown(what: str, word: str, known: Iterable[str]) -> str:
     return f"no such {what}; allowed: {', '.join(names)}" + (f"; did you mean {close[0]}?" if close else "")
 
 
-_SHOW = reprlib.Repr()
-_SHOW.maxstring = 60
-
-
 def _shown(value: Any) -> str:
-    """Show a value in a message, shortened, however deep a file nests it."""
-    return _SHOW.repr(value.item() if isinstance(value, np.generic) else value)
+    return shown(value.item() if isinstance(value, np.generic) else value)

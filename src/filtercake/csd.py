@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,11 +15,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from filtercake.errors import CsdError
-from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, FloatArray, split_header
+from filtercake.errors import CsdError, shown
+from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, NUMBER, FloatArray, split_header
+from filtercake.user_files import Unusable, read_text
 
 SUM_TOLERANCE = 0.01
 """Volume fractions are normalised when their sum is within this of 1; further off is an error."""
+
+LARGEST_FILE = 1_000_000
+"""Bytes of a CSV beyond which it is surely not a size distribution."""
+
+SMALLEST_SIZE, LARGEST_SIZE = 1e-9, 1.0
+"""Diameters, m, that a class may have: far beyond what is filtered, and safe to compute with."""
+
+MOST_CLASSES = 10_000
+"""Classes of a distribution at most."""
 
 SAME_SIZE = 1e-9
 """Relative difference of sizes that is rounding (20 um and 0.02 mm)."""
@@ -252,6 +263,8 @@ def read_csd(path: Path) -> CrystalSizeDistribution:
     """
     rows = _read_rows(path)
     header = [split_header(cell) for cell in rows[0][1]]
+    if len(rows) - 1 > MOST_CLASSES:
+        raise CsdError(f"{path}: {len(rows) - 1} classes: must be at most {MOST_CLASSES}")
     size_column, size_factor = _column(path, header, "size", LENGTH_UNITS, default=None)
     share_column, share_factor = _column(path, header, "volume_fraction", FRACTION_UNITS, default="")
     for line, row in rows[1:]:
@@ -326,6 +339,10 @@ def _check_classes(sizes: FloatArray, fractions: FloatArray) -> None:
     if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):
         bad = sizes[~(np.isfinite(sizes) & (sizes > 0.0))][0]
         raise CsdError(f"size {bad / MICROMETRE:g} um: sizes must be positive and finite")
+    if not ((sizes >= SMALLEST_SIZE * (1.0 - SAME_SIZE)) & (sizes <= LARGEST_SIZE * (1.0 + SAME_SIZE))).all():
+        bad = sizes[(sizes < SMALLEST_SIZE) | (sizes > LARGEST_SIZE)][0]
+        limits = f"{SMALLEST_SIZE / MICROMETRE:g} to {LARGEST_SIZE / MICROMETRE:g} um"
+        raise CsdError(f"size {bad / MICROMETRE:g} um: sizes must be {limits}; is the unit right?")
     if not (np.isfinite(fractions).all() and (fractions >= 0.0).all()):
         bad = fractions[~(np.isfinite(fractions) & (fractions >= 0.0))][0]
         raise CsdError(f"volume fraction {bad:g}: fractions must be finite and not negative")
@@ -337,13 +354,12 @@ def _check_classes(sizes: FloatArray, fractions: FloatArray) -> None:
 def _read_rows(path: Path) -> list[tuple[int, list[str]]]:
     """Rows that are not blank, with their line numbers."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
-            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except OSError as error:
-        raise CsdError(f"{path}: cannot be read ({error.strerror})") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise CsdError(f"{path}: is not a UTF-8 CSV file ({error})") from None
+        reader = csv.reader(io.StringIO(read_text(path, LARGEST_FILE), newline=""))
+        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except Unusable as error:
+        raise CsdError(f"{path}: {error}") from None
+    except csv.Error as error:
+        raise CsdError(f"{path}: is not a CSV file ({error})") from None
     if len(rows) < 2:
         raise CsdError(f"{path}: holds no class; the first line names the columns, each further line is a class")
     return rows
@@ -360,20 +376,19 @@ def _column(
     names = [cell for cell, _ in header]
     if names.count(name) != 1:
         raise CsdError(
-            f"{path}: header {names}: needs exactly one column {name!r} (for example size_um,volume_fraction)"
+            f"{path}: header {shown(names)}: needs exactly one column {name!r} (for example size_um,volume_fraction)"
         )
     index = names.index(name)
     unit = header[index][1]
     unit = default if unit is None else unit
     if unit is None or unit not in units:
         known = ", ".join(key for key in units if key)
-        raise CsdError(f"{path}: column {name!r} has unit {unit!r}; name one of {known} in the header")
+        raise CsdError(f"{path}: column {name!r} has unit {shown(unit)}; name one of {known} in the header")
     return index, units[unit]
 
 
 def _number(path: Path, line: int, row: list[str], column: int) -> float:
     text = row[column].strip() if column < len(row) else ""
-    try:
-        return float(text)
-    except ValueError:
-        raise CsdError(f"{path}: line {line}: {text!r} is not a number (use a decimal point)") from None
+    if not NUMBER.fullmatch(text):
+        raise CsdError(f"{path}: line {line}: {shown(text)} is not a number (use a decimal point)")
+    return float(text)

@@ -2,12 +2,42 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+
+MOST_SHOWN = 20
+"""Problems that a message lists; a file of nonsense has thousands."""
+LONGEST_SHOWN = 60
+"""Characters of a value that a message shows."""
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = LONGEST_SHOWN
+
+
+def shown(value: Any) -> str:
+    """Show a value in a message, shortened, however large or deep a file makes it."""
+    try:
+        text = _SHORT.repr(value)
+    except ValueError:  # an int of more digits than Python writes
+        return "(a number of very many digits)"
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
+
+
+def visible(text: str) -> str:
+    """Write what a terminal would obey, and halves of characters, as escapes; lines and tabs stay."""
+    if all(character.isprintable() or character in "\n\t" for character in text):
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
 
 
 class FiltercakeError(Exception):
     """Base of every error raised on purpose; its text is meant for the user, without a traceback."""
+
+    def __str__(self) -> str:
+        """Return the text, fit for a terminal whatever the files and values it names are called."""
+        return visible(super().__str__())
 
 
 @dataclass(frozen=True)
@@ -32,15 +62,19 @@ class Problem:
     allowed: str
 
     def __str__(self) -> str:
-        return f"{self.file}: {self.key} = {self.value}: {self.allowed}"
+        value = f" = {self.value}" if self.value else ""
+        return f"{self.file}: {self.key}{value}: {self.allowed}"
 
 
 class ConfigError(FiltercakeError):
-    """The configuration is wrong; holds every problem found, not just the first."""
+    """The configuration is wrong; holds every problem found, and lists the first ``MOST_SHOWN``."""
 
     def __init__(self, problems: Sequence[Problem]):
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        lines = [str(problem) for problem in self.problems[:MOST_SHOWN]]
+        if len(self.problems) > MOST_SHOWN:
+            lines.append(f"... and {len(self.problems) - MOST_SHOWN} more problems")
+        super().__init__("\n".join(lines))
 
 
 class CsdError(FiltercakeError):

@@ -23,6 +23,8 @@ FRICTIONAL_TIME_STEP: Final = 0.2
 """The same at mu > 0: rotation on several tangential springs is the fastest motion, and limits the step."""
 LARGEST_DENSITY: Final = 25_000.0
 """Crystal density, kg/m3, over that of any solid: heavier spheres strike soft contacts too hard."""
+SMALLEST_TIME_STEP: Final = 0.001
+"""Time step over the Rayleigh step below which a bed takes hundreds of times as long for nothing: refused."""
 LARGEST_TIME_STEP: Final = 1.0
 """Time step over the Rayleigh step from which beds explode: refused."""
 SMALL_RESTITUTION, DAMPED_TIME_STEP = 0.1, 0.5
@@ -114,6 +116,12 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
             "time_step",
             f"must be below the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us ({PAGE}); leave it out for "
             f"{FRICTIONLESS_TIME_STEP:g} of that (without friction) or {FRICTIONAL_TIME_STEP:g} (with)",
+        )
+    elif scene.time_step < SMALLEST_TIME_STEP * (1.0 - 1e-9) * scene.rayleigh:
+        yield Finding(
+            "time_step",
+            f"must be at least {SMALLEST_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us: "
+            "shorter ones change nothing but the run time",
         )
     elif scene.restitution < SMALL_RESTITUTION and scene.time_step > (DAMPED_TIME_STEP + 1e-9) * scene.rayleigh:
         yield Finding(

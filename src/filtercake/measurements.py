@@ -15,8 +15,8 @@ import pandas as pd
 from pydantic import Field, model_validator
 from scipy import special
 
-from filtercake.config import TO_NUMBER, Model, Name
-from filtercake.config_loading import parse, read_yaml
+from filtercake.config import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText
+from filtercake.config_loading import parse
 from filtercake.errors import ConfigError, FiltrationError, Problem
 from filtercake.filtration import (
     MINIMUM_READINGS,
@@ -30,13 +30,17 @@ from filtercake.filtration import (
     fit_integral,
 )
 from filtercake.pooling import chi_square, improbable, scatter
-from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, FloatArray, IntArray
+from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, NUMBER, FloatArray, IntArray
+from filtercake.user_files import Unusable, read_text, read_yaml
 
 TIME_UNITS: Final[dict[str, float]] = {"s": 1.0, "min": MINUTE, "h": HOUR}
 VOLUME_UNITS: Final[dict[str, float]] = {"m3": 1.0, "L": 1e-3, "mL": 1e-6, "cm3": 1e-6, "uL": 1e-9}
 
 LARGEST_FILE: Final = 10_000_000
 """Bytes of a CSV beyond which it is surely not a filtration test."""
+
+MOST_TESTS: Final = 100
+"""Filtration tests of a file."""
 
 BALANCE_RESOLUTION: Final = 0.005
 """Share of the final volume by which a reading may fall below an earlier one and is left out, not refused."""
@@ -94,7 +98,6 @@ _OTHER_CASE: Final = ("T", "v")
 _EXAMPLE: Final = "for example time_s,volume_mL or t [s];V [L]"
 _WANTED_HEADER: Final = f"names a column of times and one of filtrate volumes with their units, {_EXAMPLE}"
 _WITH_UNIT: Final = re.compile(r"(?P<name>[^\[(/]*?)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]|/\s*(?P<slash>\S+))")
-_NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 Kind = Literal["time", "volume"]
 
@@ -102,24 +105,24 @@ Kind = Literal["time", "volume"]
 class ConstantPressureTest(Model):
     """A filtration test at constant pressure, whose readings are in a CSV file."""
 
-    name: Annotated[str, Field(min_length=1, max_length=60)] | None = Field(
+    name: Annotated[str, Field(min_length=1, max_length=60), TO_TEXT] | None = Field(
         default=None, description="Name in tables and figures; the file's name without its ending if left out."
     )
     csd: Name = Field(description="Name of a distribution of the study.")
-    file: Annotated[str, Field(min_length=1)] = Field(
+    file: PathText = Field(
         description="CSV with a column of times and one of filtrate volumes, units in the header (time_s,volume_mL); "
         "path relative to this file."
     )
-    area_cm2: Annotated[float, Field(gt=0, le=1e8, allow_inf_nan=False), TO_NUMBER] = Field(
+    area_cm2: Annotated[float, Field(ge=1e-4, le=1e8, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Filter area, cm2."
     )
-    pressure_drop_kPa: Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
+    pressure_drop_kPa: Annotated[float, Field(ge=0.001, le=10_000, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
         description="Pressure drop across cake and medium, kPa."
     )
-    viscosity_mPa_s: Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
+    viscosity_mPa_s: Annotated[float, Field(ge=0.001, le=1e6, allow_inf_nan=False), TO_NUMBER] = Field(  # noqa: N815
         description="Viscosity of the filtrate, mPa s."
     )
-    slurry_concentration_kg_m3: Annotated[float, Field(gt=0, le=1e5, allow_inf_nan=False), TO_NUMBER] = Field(
+    slurry_concentration_kg_m3: Annotated[float, Field(ge=0.001, le=1e5, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Dry cake mass per volume of filtrate, kg/m3 (= g/L)."
     )
 
@@ -127,18 +130,18 @@ class ConstantPressureTest(Model):
 class KnownResistance(Model):
     """A cake resistance that was measured elsewhere."""
 
-    name: Annotated[str, Field(min_length=1, max_length=60)] | None = Field(
+    name: Annotated[str, Field(min_length=1, max_length=60), TO_TEXT] | None = Field(
         default=None, description="Name in tables and figures; the distribution's if left out."
     )
     csd: Name = Field(description="Name of a distribution of the study.")
-    resistance_m_kg: Annotated[float, Field(gt=0, le=1e20, allow_inf_nan=False), TO_NUMBER] = Field(
+    resistance_m_kg: Annotated[float, Field(ge=1, le=1e20, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Specific cake resistance, m/kg."
     )
-    relative_uncertainty: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
+    relative_uncertainty: Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Its standard deviation over its value."
     )
-    source: Annotated[str, Field(max_length=120)] = Field(description="Where it is from.")
-    pressure_drop_kPa: Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False), TO_NUMBER] | None = Field(  # noqa: N815
+    source: Annotated[str, Field(max_length=120), TO_TEXT] = Field(description="Where it is from.")
+    pressure_drop_kPa: Annotated[float, Field(ge=0.001, le=10_000, allow_inf_nan=False), TO_NUMBER] | None = Field(  # noqa: N815
         default=None, description="Pressure drop it was measured at, kPa."
     )
 
@@ -146,9 +149,13 @@ class KnownResistance(Model):
 class MeasurementFile(Model):
     """Measured cake resistances: filtration tests, values, or both."""
 
-    title: Annotated[str, Field(max_length=120)] = Field(default="", description="One line for figures.")
-    tests: list[ConstantPressureTest] = Field(default=[], description="Filtration tests at constant pressure.")
-    resistances: list[KnownResistance] = Field(default=[], description="Resistances that are known already.")
+    title: Annotated[str, Field(max_length=120), TO_TEXT] = Field(default="", description="One line for figures.")
+    tests: Annotated[list[ConstantPressureTest], Field(max_length=MOST_TESTS)] = Field(
+        default=[], description="Filtration tests at constant pressure."
+    )
+    resistances: Annotated[list[KnownResistance], Field(max_length=MOST_VALUES)] = Field(
+        default=[], description="Resistances that are known already."
+    )
 
     @model_validator(mode="after")
     def _something(self) -> MeasurementFile:
@@ -462,17 +469,9 @@ class _Header(NamedTuple):
 def _lines(path: Path) -> list[tuple[int, str]]:
     """Lines that hold something, with their numbers."""
     try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise FiltrationError(f"{path}: {size} bytes: must be at most {LARGEST_FILE // 10**6} MB")
-        content = path.read_bytes()
-    except OSError as error:
-        raise FiltrationError(f"{path}: cannot be read ({error.strerror})") from None
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise FiltrationError(f"{path}: line {line}: must be UTF-8 text, not {content[error.start]:#x}") from None
+        text = read_text(path, LARGEST_FILE)
+    except Unusable as error:
+        raise FiltrationError(f"{path}: {error}") from None
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise FiltrationError(f"{path}: line {line}: must be text, not binary data")
@@ -498,7 +497,7 @@ def _header(path: Path, lines: Sequence[tuple[int, str]]) -> _Header:
                 time, time_factor = _the_column(path, line, columns, "time")
                 volume, volume_factor = _the_column(path, line, columns, "volume")
                 return _Header(position, separator, len(cells), time, volume, time_factor, volume_factor)
-            if len(cells) > 1 and all(_NUMBER.fullmatch(cell.replace(",", ".")) for cell in cells):
+            if len(cells) > 1 and all(NUMBER.fullmatch(cell.replace(",", ".")) for cell in cells):
                 raise FiltrationError(
                     f"{path}: line {line}: {_shown(text)}: numbers, but no line above {_WANTED_HEADER}"
                 )
@@ -583,7 +582,7 @@ def _has_decimal_commas(path: Path, header: _Header, cells: Sequence[tuple[int, 
 
 
 def _number(path: Path, line: int, name: str, text: str) -> float:
-    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    value = float(text) if NUMBER.fullmatch(text) else math.nan
     if 0.0 <= value < math.inf:
         return value
     allowed = "must not be negative" if value < 0.0 else "must be a finite number, with a decimal point if any"

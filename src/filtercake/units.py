@@ -34,6 +34,9 @@ LENGTH_UNITS: Final[dict[str, float]] = {
 }
 FRACTION_UNITS: Final[dict[str, float]] = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01, "percent": 0.01}
 
+NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+"""A number as text: plain digits, without the underscores, infinities and NaN that Python would take."""
+
 _HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<bracket>[^\])]*)\s*[\])])?\s*$")
 
 

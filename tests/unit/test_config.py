@@ -192,10 +192,20 @@ BROKEN: list[tuple[Any, ...]] = [
         "  density_kg_m3: 1180", "  friction: 0", "material.density_kg_m3", "(missing)", "must be given", id="-"
     ),
     pytest.param(
-        "size_um: 20", "size_um: -20", "csds.bimodal.mixture[0].size_um", "-20", "must be greater than 0", id="negative"
+        "size_um: 20",
+        "size_um: -20",
+        "csds.bimodal.mixture[0].size_um",
+        "-20",
+        "must be greater than or equal to 0.001",
+        id="negative",
     ),
     pytest.param(
-        "size_um: 20", "size_um: 0", "csds.bimodal.mixture[0].size_um", "0", "must be greater than 0", id="zero size"
+        "size_um: 20",
+        "size_um: 0",
+        "csds.bimodal.mixture[0].size_um",
+        "0",
+        "must be greater than or equal to 0.001",
+        id="zero size",
     ),
     pytest.param(
         "size_um: 20, volume_fraction: 0.5",
@@ -294,7 +304,7 @@ def test_a_wrong_value_is_named(
         ("void_fraction: 0.45", "void_fraction", "0.45", "must be greater than or equal to 0.5"),
         ("time_step_rayleigh: 1", "time_step_rayleigh", "1", "must be less than 1"),
         ("time_step_rayleigh: 1.5", "time_step_rayleigh", "1.5", "must be less than 1"),
-        ("time_step_us: 0", "time_step_us", "0", "must be greater than 0"),
+        ("time_step_us: 0", "time_step_us", "0", "must be greater than or equal to 0.000000001"),
         # pi 10e-6 sqrt(1180/(5e6/2.4))/(0.1631*0.2 + 0.8766) = 0.8223 us
         (
             "time_step_us: 0.9",
@@ -314,7 +324,7 @@ def test_a_wrong_value_is_named(
         ("write_vtk: perhaps", "write_vtk", "'perhaps'", "must be a valid boolean"),
         ("max_fall_times: .inf", "max_fall_times", "inf", "must be"),
         ("partikel: 5", "partikel", "5", "unknown key; allowed here: particles, void_fraction"),
-        ("time_limit_min: 0", "time_limit_min", "0", "must be greater than 0"),
+        ("time_limit_min: 0", "time_limit_min", "0", "must be greater than or equal to 0.001"),
     ],
 )
 def test_a_wrong_packing_value_is_named(
@@ -375,7 +385,7 @@ def test_a_missing_csv_is_named(write_study, good_study: str, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"\x00\xff\xfe garbage", "is not a UTF-8 CSV file"),
+        (b"\x00\xff\xfe garbage", "must be UTF-8 text"),
         (b"lorem ipsum\ndolor\n", "needs exactly one column 'size'"),
         (b"", "holds no class"),
         (b"size_um,volume_fraction\n20,0.5\nx,0.5\n", "line 3: 'x' is not a number"),
@@ -449,9 +459,9 @@ def test_the_problems_of_all_studies_are_reported_together(write_study, good_stu
         ("m:\n  x: {f: 1, f: 2}\n", "the key 'f' stands twice"),
         ("a: &x [1]\nb: *x\n", "aliases (*name) are not allowed"),
         ("base: &b {a: 1}\nc:\n  <<: *b\n", "aliases (*name) are not allowed"),
-        ("a: !!python/object/apply:os.system ['true']\n", "could not determine a constructor"),
-        ("a: !!python/object:filtercake.errors.Problem {}\n", "could not determine a constructor"),
-        ("a: !include other.yaml\n", "could not determine a constructor"),
+        ("a: !!python/object/apply:os.system ['true']\n", "tags (!name) are not allowed"),
+        ("a: !!python/object:filtercake.errors.Problem {}\n", "tags (!name) are not allowed"),
+        ("a: !include other.yaml\n", "tags (!name) are not allowed"),
         ("a: [1, 2\n", "not valid YAML"),
         ("a: 1\n b: 2\n", "not valid YAML"),
         ("a:\tb\n\t- c\n", "not valid YAML"),
@@ -482,7 +492,7 @@ def test_a_file_that_is_not_a_mapping_is_refused(write_study, text: str) -> None
 
 
 def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"nowhere\.yaml: .*cannot be read: No such file"):
+    with pytest.raises(ConfigError, match=r"nowhere\.yaml: .*cannot be read \(No such file"):
         load_study(tmp_path / "nowhere.yaml")
     with pytest.raises(ConfigError, match="cannot be read"):
         load_study(tmp_path)
@@ -490,7 +500,7 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="must be UTF-8 text"):
         load_study(tmp_path / "bytes.yaml")
     (tmp_path / "big.yaml").write_text("#" * 1_000_001, encoding="utf-8")
-    with pytest.raises(ConfigError, match="at most 1 MB"):
+    with pytest.raises(ConfigError, match="at most 200 kB"):
         load_study(tmp_path / "big.yaml")
 
 
@@ -696,8 +706,8 @@ def test_other_kinetics_are_one_word(tmp_path: Path) -> None:
     [
         ("ammonium_alum", "amonium_alum", "crystallizer.kinetics", "did you mean ammonium_alum"),
         ("crystallizer:", "title: none\nunknown:", "unknown", "unknown key"),
-        ("kg_m3: 200", "kg_m3: -1", "crystallizer.slurry_density_kg_m3", "greater than 0"),
-        ("[15, 7.5]", "[0]", "sweeps[0].residence_time_min[0]", "greater than 0"),
+        ("kg_m3: 200", "kg_m3: -1", "crystallizer.slurry_density_kg_m3", "greater than or equal to 0.001"),
+        ("[15, 7.5]", "[0]", "sweeps[0].residence_time_min[0]", "greater than or equal to 0.001"),
         ("- residence", "- csd: a\n    residence", "sweeps[0]", "exactly one of csd and residence_time_min"),
         (
             "  kinetics: ammonium_alum",

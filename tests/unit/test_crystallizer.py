@@ -317,7 +317,7 @@ def test_only_the_size_over_the_scale_matters(a: float, k: float) -> None:
     assert sum_x_over_d2(k * a) == pytest.approx(sum_x_over_d2(a) / k**2, rel=1e-12)
 
 
-@given(st.floats(1e-5, 1e-3), st.integers(20, 400), st.floats(0.01, 100.0))
+@given(st.floats(1e-5, 1e-3), st.integers(20, 400), st.floats(0.01, 60.0))
 def test_classes_scale_with_the_size_scale(a: float, bins: int, k: float) -> None:
     # half a bin away from a whole number of bins, so that rounding cannot change their number
     width = 15.0 * a / (bins + 0.5)
@@ -522,7 +522,7 @@ def test_all_problems_are_said_at_once(tmp_path: Path) -> None:
         ("borax: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
         ("? [a]\n: 1\n", "not valid YAML"),
         ("[" * 5000, "not valid YAML"),
-        ("a: &a [*a]\n", "a = [[[[[[[...]]]]]]]: must be a mapping"),
+        ("a: &a [*a]\n", "line 1, column 8: not valid YAML: aliases (*name) are not allowed here"),
     ],
 )
 def test_a_file_that_is_no_kinetics_is_refused(tmp_path: Path, text: str, says: str) -> None:
@@ -539,7 +539,7 @@ def test_a_missing_folder_or_binary_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CrystallizerError, match="cannot be read"):
         load_kinetics(tmp_path)
     (tmp_path / "binary.yaml").write_bytes(bytes(range(256)))
-    with pytest.raises(CrystallizerError, match=r"binary\.yaml: must be UTF-8"):
+    with pytest.raises(CrystallizerError, match=r"binary\.yaml: line 2: must be UTF-8"):
         load_kinetics(tmp_path / "binary.yaml")
 
 

@@ -120,7 +120,12 @@ def test_a_distribution_s_own_truncation_holds_for_it(changed: Callable[..., Loa
     [
         ("  slurry", "  truncate_below_um: 900\n  slurry", "csds.tau_15min.residence_time_min", "none is between 900"),
         ("  slurry", "  truncate_below_um: 50\n  truncate_above_um: 50\n  slurry", "crystallizer", "must be below"),
-        ("  slurry", "  truncate_above_um: 0\n  slurry", "crystallizer.truncate_above_um", "greater than 0"),
+        (
+            "  slurry",
+            "  truncate_above_um: 0\n  slurry",
+            "crystallizer.truncate_above_um",
+            "greater than or equal to 0.001",
+        ),
         (
             "crystallizer:",
             "csds: {a: {residence_time_min: 60, truncate_above_um: 4, truncate_below_um: 9}}\ncrystallizer:",

@@ -6,7 +6,11 @@ BROKEN = {
     "unknown key": ("packing:\n", "packing:\n  colour: red\n", ["packing.colour", "red", "unknown key", "particles"]),
     "misspelt key": ("  replicates: 2", "  replicats: 2", ["packing.replicats", "did you mean replicates?"]),
     "text number": ("particles: 400", "particles: many", ["packing.particles", "'many'", "must be a number"]),
-    "negative size": ("size_um: 30", "size_um: -30", ["csds.bimodal.mixture[0].size_um", "-30", "greater than 0"]),
+    "negative size": (
+        "size_um: 30",
+        "size_um: -30",
+        ["csds.bimodal.mixture[0].size_um", "-30", "greater than or equal to 0.001"],
+    ),
     "fractions": (
         "size_um: 30, volume_fraction: 0.5",
         "size_um: 30, volume_fraction: 0.3",

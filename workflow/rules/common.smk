@@ -1,9 +1,7 @@
 # Loads and checks the configuration, and offers the helpers that the rules share. Stops here, before any job,
 # with every problem of every file when something is wrong.
 import os
-import sys
 import time
-from pathlib import Path
 
 from filtercake import console, engine_choice
 from filtercake.calibration_config import (
@@ -11,8 +9,7 @@ from filtercake.calibration_config import (
     load_calibrations,
     settings_of,
 )
-from filtercake.config_loading import find_studies, load_studies, load_workflow
-from filtercake.errors import FiltercakeError
+from filtercake.config_loading import find_studies, load_studies
 from filtercake.figures import calibrated, catalogue
 from filtercake.job import PROGRESS_VARIABLE, Progress
 from filtercake.packing.engines.base import parallelism
@@ -30,12 +27,6 @@ for handler in logger.handlers:
         handler.addFilter(console.worth_reading)
 
 ROOT = Path(workflow.basedir)
-CONFIG_FILE = "config/config.yaml"
-
-
-def stop(error):
-    print(f"\nfiltercake cannot start:\n{error}\n", file=sys.stderr)
-    sys.exit(1)
 
 
 def points_by_name(studies):

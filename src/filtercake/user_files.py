@@ -1,0 +1,118 @@
+"""Read a user's files without trusting them: regular files of bounded size, UTF-8, YAML without surprises."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+import yaml
+
+from filtercake.errors import ConfigError, FiltercakeError, Problem, shown
+
+LARGEST_YAML: Final = 200_000
+"""Bytes of a configuration file beyond which it is surely not one."""
+
+
+class Unusable(FiltercakeError):  # noqa: N818 - reads better where it is caught
+    """A file that cannot be used; the text says why, the caller says which."""
+
+
+def read_text(path: Path, largest: int) -> str:
+    """Read a regular UTF-8 file, with or without a byte order mark, of at most ``largest`` bytes.
+
+    Devices and pipes are refused before anything is read: they may have no end, or wait for ever.
+
+    Raises
+    ------
+    Unusable
+        If there is no such file, or it is not text of that size.
+    """
+    try:
+        with open(path, "rb", opener=_without_waiting) as stream:
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise Unusable("must be a regular file, not a device or a pipe")
+            content: bytes = stream.read(largest + 1)
+    except OSError as error:
+        raise Unusable(f"cannot be read ({error.strerror})") from None
+    except ValueError:  # NUL or half a character in the path
+        raise Unusable("cannot be read (no file has such a name)") from None
+    if len(content) > largest:
+        raise Unusable(f"must be at most {_size(largest)}")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise Unusable(f"line {line}: must be UTF-8 text, not {content[error.start]:#x}") from None
+
+
+def is_file(path: Path) -> bool:
+    """Whether a path is a regular file; False where the path itself is impossible (too long, not allowed)."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def read_yaml(path: Path) -> Any:
+    """Parse a YAML file without tags, aliases that multiply, or surprises.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read or is not YAML.
+    """
+    try:
+        return yaml.load(read_text(path, LARGEST_YAML), Loader=_Loader)
+    except Unusable as error:
+        raise _problem(path, "(file)", str(error)) from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "(file)"
+        raise _problem(path, where, f"not valid YAML: {error.problem}") from None
+    except RecursionError:
+        raise _problem(path, "(file)", "not valid YAML: nested too deeply") from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise _problem(path, "(file)", f"not valid YAML: {' '.join(str(error).split())}") from None
+
+
+def _problem(path: Path, where: str, allowed: str) -> ConfigError:
+    return ConfigError([Problem(str(path), where, "", allowed)])
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open without waiting for the other end of a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def _size(size: int) -> str:
+    return f"{size // 10**6} MB" if size >= 10**6 else f"{size // 10**3} kB"
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe YAML without tags, without aliases (they can multiply a small file into a huge one) and doubled keys."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        if isinstance(event, yaml.AliasEvent):
+            self._refuse("aliases (*name) are not allowed here", event.start_mark)
+        if getattr(event, "tag", None) is not None:
+            self._refuse("tags (!name) are not allowed here", event.start_mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            if key_node.tag == "tag:yaml.org,2002:merge":
+                self._refuse("merge keys (<<) are not allowed here", key_node.start_mark)
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, (list, dict)):
+                self._refuse("keys must be plain text", key_node.start_mark)
+            if key in seen:
+                self._refuse(f"the key {shown(key)} stands twice", key_node.start_mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+    def _refuse(self, text: str, mark: Any) -> NoReturn:
+        raise yaml.constructor.ConstructorError(None, None, text, mark)
