@@ -1,10 +1,11 @@
 # The two commands: make run, make test. Both set up what they need first.
 VENV ?= .venv
 CORES ?= 2
+PROFILE ?=
 STUDIES ?=
 CALIBRATION ?= pmma
 BIN := $(VENV)/bin
-SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
+SNAKEMAKE := $(BIN)/snakemake $(if $(PROFILE),--workflow-profile $(PROFILE),--cores $(CORES))
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
@@ -17,7 +18,7 @@ help:
 setup: ## create the environment; install LIGGGHTS where possible
 	@workflow/envs/setup.sh $(VENV)
 
-run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others)
+run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others; PROFILE=slurm on a cluster)
 	$(SNAKEMAKE) $(CONFIG)
 
 test: setup lint ## lint, type-check and run the fast tests
