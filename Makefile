@@ -10,7 +10,7 @@ CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run benchmark stability reference calibrate test test-all slurm-test lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -24,8 +24,12 @@ run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others; PRO
 test: setup lint ## lint, type-check and run the fast tests
 	$(BIN)/pytest
 
-test-all: setup lint ## every test, slow ones too
-	$(BIN)/pytest -m ""
+test-all: setup lint ## every test, slow ones too (that of clusters: make slurm-test)
+	$(BIN)/pytest -m "not slurm"
+
+slurm-test: setup ## the workflow on a private two-node Slurm (Debian's slurm-wlm is installed where root allows)
+	@workflow/envs/slurm.sh
+	$(BIN)/pytest tests/slurm -m slurm
 
 lint: setup ## ruff, mypy --strict, snakefmt, snakemake --lint
 	$(BIN)/ruff check .

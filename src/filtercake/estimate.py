@@ -56,9 +56,9 @@ SPREAD_PARTICLES: Final = 2000
 QUANTILE: Final = 2.3
 """Of Student's t for about nine packings."""
 
-BASE_MB: Final = 900
-"""Memory of a job before its first sphere: Snakemake on the node (twice), Python with numba."""
-SPHERE_MB: Final = 0.01
+BASE_MB: Final = 1200
+"""Memory of a job before its first sphere: Snakemake on the node (twice 260 MB), Python with numba (330), and room."""
+SPHERE_MB: Final = 0.005
 """Memory of one sphere while it is packed."""
 
 SPHERE_BYTES: Final = 32
@@ -70,17 +70,19 @@ POINT_BYTES: Final = 20_000
 STUDY_BYTES: Final = 3_000_000
 """A study's tables and figures."""
 
+NODE_SECONDS: Final = 10.0
+"""Seconds that a point takes on a cluster's node beside packing: Snakemake is started once for each."""
 WALLTIME_FACTOR: Final = 4.0
 """How much longer than estimated a job may take before it is ended: other machines, unlucky beds."""
-START_MINUTES: Final = 1.0
+START_MINUTES: Final = 2.0
 """Walltime for what a job does beside packing, on a busy file system."""
 LONGEST_MINUTES: Final = 10_080
 """A week: more than that few clusters grant."""
 
-SUBMISSION_MINUTES: Final = 5.0
-"""Work, estimated, that makes one submission to a cluster worth its start-up."""
-GROUP_SIZES: Final = (64, 16, 4)
-"""Points in one submission; each takes the largest whose work stays near ``SUBMISSION_MINUTES``."""
+SUBMISSION_MINUTES: Final = 10.0
+"""Estimated time that makes one submission worth its wait in a cluster's queue."""
+GROUP_SIZES: Final = (32, 8)
+"""Points in one submission, one after the other; the largest that stays within ``SUBMISSION_MINUTES`` is taken."""
 
 Csds = Mapping[str, CrystalSizeDistribution]
 
@@ -184,8 +186,8 @@ def group_size(point: Point, csd: CrystalSizeDistribution) -> int:
     """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one."""
     if parallelism(point.spec) > 1:
         return 1
-    minutes = job_seconds(point, csd) / MINUTE
-    return next((size for size in GROUP_SIZES if size * minutes <= 2.0 * SUBMISSION_MINUTES), 1)
+    minutes = (NODE_SECONDS + job_seconds(point, csd)) / MINUTE
+    return next((size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES), 1)
 
 
 def estimate(points: Iterable[Point], csds: Csds) -> Estimate:

@@ -23,6 +23,7 @@ rule packing:
     resources:
         mem_mb=lambda wildcards: estimate.memory_mb(point_of(wildcards).spec),
         runtime=packing_minutes,
+        cpus_per_task=lambda wildcards: parallelism(point_of(wildcards).spec),
     params:
         spec=lambda wildcards: point_of(wildcards).spec.as_dict(),
         replicates=lambda wildcards: point_of(wildcards).replicates,
