@@ -159,15 +159,10 @@ def packings_of(point: Point) -> int:
     return min(max(needed, LEAST_REPLICATES, point.replicates), point.most_replicates)
 
 
-def core_seconds(point: Point, csd: CrystalSizeDistribution) -> float:
-    """Return the time of a point's job on one core, s, start-up included."""
-    return START_SECONDS + packings_of(point) * packing_seconds(point.spec, csd)
-
-
-def job_seconds(point: Point, csd: CrystalSizeDistribution) -> float:
-    """Return the wall time of a point's job on the cores it takes, s."""
+def job_seconds(point: Point, csd: CrystalSizeDistribution, start: float = START_SECONDS) -> float:
+    """Return the wall time of a point's job on the cores it takes, s; ``start`` is its time beside packing."""
     # ASSUME: two processes or threads halve the time of a large bed
-    return START_SECONDS + packings_of(point) * packing_seconds(point.spec, csd) / parallelism(point.spec)
+    return start + packings_of(point) * packing_seconds(point.spec, csd) / parallelism(point.spec)
 
 
 def walltime_minutes(point: Point, csd: CrystalSizeDistribution, attempt: int = 1) -> int:
@@ -186,11 +181,11 @@ def group_size(point: Point, csd: CrystalSizeDistribution) -> int:
     """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one."""
     if parallelism(point.spec) > 1:
         return 1
-    minutes = (NODE_SECONDS + job_seconds(point, csd)) / MINUTE
+    minutes = job_seconds(point, csd, START_SECONDS + NODE_SECONDS) / MINUTE
     return next((size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES), 1)
 
 
-def estimate(points: Iterable[Point], csds: Csds) -> Estimate:
+def estimate(points: Iterable[Point], csds: Csds, *, on_cluster: bool = False) -> Estimate:
     """Estimate what a study's points will cost.
 
     Parameters
@@ -199,14 +194,17 @@ def estimate(points: Iterable[Point], csds: Csds) -> Estimate:
         Those to be made.
     csds : mapping of str to CrystalSizeDistribution
         The (truncated) distributions by name.
+    on_cluster : bool
+        Whether Snakemake is started on a node for each.
     """
+    start = START_SECONDS + (NODE_SECONDS if on_cluster else 0.0)
     listed = [(point, csds[point.csd]) for point in points]
     packings = [packings_of(point) for point, _ in listed]
     bytes_each = [SPHERE_BYTES * point.spec.particles + PACKING_BYTES for point, _ in listed]
     written = sum(n * size for n, size in zip(packings, bytes_each, strict=True))
     return Estimate(
-        core_seconds=sum(core_seconds(point, csd) for point, csd in listed),
-        longest=max((job_seconds(point, csd) for point, csd in listed), default=0.0),
+        core_seconds=sum(job_seconds(point, csd, start) * parallelism(point.spec) for point, csd in listed),
+        longest=max((job_seconds(point, csd, start) for point, csd in listed), default=0.0),
         disk=written + POINT_BYTES * len(listed) + (STUDY_BYTES if listed else 0),
         points=len(listed),
         packings=sum(packings),

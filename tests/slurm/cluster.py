@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import shutil
 import signal
@@ -107,7 +108,12 @@ class Cluster:
     def _daemon(self, name: str, *command: str) -> None:
         output = (self.folder / "log" / f"{name}.out").open("w")
         self.daemons[name] = subprocess.Popen(
-            command, env=self.environment, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
+            command,
+            env=self.environment,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            preexec_fn=end_with_parent,
         )
 
     def ask(self, *command: str) -> str:
@@ -168,6 +174,11 @@ class Cluster:
         for process in self._processes():
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
+
+
+def end_with_parent() -> None:
+    """Ask Linux to end this process when the one that started it dies, killed or not."""
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
 
 
 def free_ports(count: int) -> list[int]:

@@ -111,7 +111,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[slurm.Cluster]
 def local_tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, pd.DataFrame]:
     """Tables of a run on this machine alone."""
     checkout = project.copy_project(tmp_path_factory.mktemp("local") / "project")
-    done = checkout.run("--", "results/cluster/tables/table1.csv", study=STUDY, timeout=SECONDS)
+    done = checkout.run("--", "results/cluster/tables/table1.csv", study=STUDY)
     assert done.returncode == 0, done.stderr
     return tables_in(checkout.root / "results" / "cluster")
 
@@ -142,14 +142,18 @@ def end(run: subprocess.Popen) -> str:
     return output
 
 
-def test_a_sweep(here: OnCluster, local_tables: dict[str, pd.DataFrame]) -> None:
+def test_a_sweep(here: OnCluster) -> None:
+    study = here.root / STUDY
+    study.write_text(study.read_text().replace("[50]", "[0, 50]"))
     done = here.make("run")
     output = done.stdout + done.stderr
     assert done.returncode == 0, output
     assert output.index("estimate: ") < output.index("has been submitted")
-    assert_same_tables(here.results, local_tables)
+    alone = project.Checkout(here.root).run("results=alone", "--", "alone/cluster/tables/table1.csv", study=STUDY)
+    assert alone.returncode == 0, alone.stderr
+    assert_same_tables(here.results, tables_in(here.root / "alone" / "cluster"))
     assert list(here.results.glob("figures/*.png"))
-    # the points in one submission, then the measurements, then the figures; nothing is left in the queue
+    # both points in one submission, then the measurements, then the figures; nothing is left in the queue
     assert list(here.jobs().values()) == ["COMPLETED"] * 3
     again = here.make("resume")
     assert again.returncode == 0, again.stdout + again.stderr

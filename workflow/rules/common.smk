@@ -193,10 +193,17 @@ def cost_of(points_by_study):
     """What the packings of points will cost."""
     return estimate.together(
         estimate.estimate(
-            points, {name: csd.truncated for name, csd in KNOWN[study].csds.items()}
+            points,
+            {name: csd.truncated for name, csd in KNOWN[study].csds.items()},
+            on_cluster=not workflow.local_exec,
         )
         for study, points in points_by_study.items()
     )
+
+
+def cluster_logs():
+    """Where a cluster's own logs of this run are, None on this machine alone."""
+    return None if workflow.local_exec else Path(".snakemake/slurm_logs")
 
 
 def cores_of_run():
