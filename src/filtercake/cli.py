@@ -17,8 +17,8 @@ import numpy as np
 from filtercake import __version__, api, bed, engine_choice, export
 from filtercake import cli_options as words
 from filtercake.config import Material, Packing
-from filtercake.csd import to_table
 from filtercake.config_loading import load_study
+from filtercake.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected
 from filtercake.estimate import estimate
 from filtercake.packing.result import publish

@@ -1,9 +1,10 @@
-"""The workflow on a real Slurm of two nodes: whatever becomes of a job, one command ends with the tables of a local run."""
+"""The workflow on a real Slurm of two nodes: whatever becomes of a job, the tables are those of a local run."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -35,6 +36,7 @@ SITE = "slurm-status-command: squeue\nslurm-init-seconds-before-status-checks: 3
 """What a site without an accounting database sets; and tests do not wait long for a status."""
 TABLES = ("replicates.csv", "summary.csv", "tables/table1.csv", "tables/table2.csv", "tables/table4.csv")
 SECONDS = 900
+PAGE = (project.PROJECT / "docs" / "cluster.md").read_text(encoding="utf-8")
 
 
 class OnCluster:
@@ -45,6 +47,8 @@ class OnCluster:
         self.root = project.copy_project(root).root
         for name in ("Makefile", "pyproject.toml"):
             shutil.copy(project.PROJECT / name, self.root)
+        # a link, so that a setup that finds it too old replaces the link, not the environment that runs this test
+        (self.root / ".venv").symlink_to(sys.prefix)
         site = self.root / "site"
         site.mkdir()
         (site / "profile.yaml").write_text(SITE)
@@ -52,6 +56,7 @@ class OnCluster:
             **cluster.environment,
             "PYTHONPATH": str(self.root / "src"),
             "SNAKEMAKE_PROFILE": str(site),
+            "FILTERCAKE_NO_INSTALL": "1",
         }
         self.before = set(cluster.jobs())
 
@@ -74,10 +79,17 @@ class OnCluster:
 
     def make(self, target: str) -> subprocess.CompletedProcess:
         """Run one command of the page about clusters."""
-        environment = Path(sys.prefix)
-        command = ["make", target, "PROFILE=slurm", f"STUDIES={STUDY}", f"VENV={environment}"]
+        return self.shell(f"make {target} PROFILE=slurm STUDIES={STUDY}")
+
+    def shell(self, commands: str) -> subprocess.CompletedProcess:
+        """Run commands as a user types them."""
         return subprocess.run(
-            command, cwd=self.root, env=self.environment, capture_output=True, text=True, timeout=SECONDS
+            ["bash", "-e", "-c", commands],
+            cwd=self.root,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
         )
 
     def jobs(self) -> dict[str, str]:
@@ -158,6 +170,18 @@ def test_a_sweep(here: OnCluster) -> None:
     again = here.make("resume")
     assert again.returncode == 0, again.stdout + again.stderr
     assert len(here.jobs()) == 3
+
+
+def test_the_commands_of_the_page(here: OnCluster) -> None:
+    """One after the other, on the page's own study, cut down to one small point."""
+    study = re.search(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)[1]
+    cut = re.sub(r"\[0(\.\d)?,.*\]", r"[0\1]", study).replace("replicates: 8", "replicates: 2\n  particles: 400")
+    (here.root / "config" / "studies" / "sweep.yaml").write_text(cut)
+    blocks = re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL)
+    done = here.shell("".join(blocks))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(pd.read_csv(here.root / "results" / "sweep" / "summary.csv")) == 1
+    assert set(here.jobs().values()) == {"COMPLETED"}
 
 
 def test_a_failing_job_is_tried_again(here: OnCluster, local_tables: dict[str, pd.DataFrame]) -> None:
