@@ -1,8 +1,8 @@
 """What packings will cost before they are made: core-hours, wall time, memory and disk, from measured run times.
 
-The constants are those of the machine of docs/benchmark.md, one core, undisturbed; tests hold them against its tables. A packing's
-time is its spheres times its steps times a time per sphere and step; its steps follow from how many free-fall times such
-a bed needs to come to rest.
+The constants are those of the machine of docs/benchmark.md, one core, undisturbed; tests hold them against its tables.
+A packing's time is its spheres times its steps times a time per sphere and step; its steps follow from how many
+free-fall times such a bed needs to come to rest.
 """
 
 from __future__ import annotations
@@ -117,8 +117,8 @@ class Estimate:
         """Say it in one line."""
         wall = f"{duration(self.wall_seconds(cores))} on {cores} {'core' if cores == 1 else 'cores'}"
         return (
-            f"estimate: {_amount(self.core_seconds / HOUR)} core-hours, {wall}, {_size(self.disk)} on disk (within a factor of {ACCURACY:g} on the "
-            "machine of docs/benchmark.md)"
+            f"estimate: {_amount(self.core_seconds / HOUR)} core-hours, {wall}, {_size(self.disk)} on disk "
+            f"(within a factor of {ACCURACY:g} on the machine of docs/benchmark.md)"
         )
 
 
