@@ -129,7 +129,7 @@ def fall_steps(spec: PackingSpec, csd: CrystalSizeDistribution) -> float:
     length = box_length(csd, spec.particles, spec.void_fraction, spec.column_ratio)
     fall = spec.free_fall_time(PLACEMENT_HEIGHT * spec.column_ratio * length)
     falls = FALLS[spec.friction > 0.0, spec.cohesion > 0.0] * (WIDE_FALLS if _wide(csd) else 1.0)
-    return min(falls, spec.max_fall_times) * fall / spec.time_step
+    return float(min(falls, spec.max_fall_times) * fall / spec.time_step)
 
 
 def packing_seconds(spec: PackingSpec, csd: CrystalSizeDistribution) -> float:
@@ -147,7 +147,7 @@ def packing_seconds(spec: PackingSpec, csd: CrystalSizeDistribution) -> float:
         return seconds
     if spec.engine == "liggghts" and _wide(csd):
         seconds *= WIDE_LIGGGHTS
-    return seconds * (spec.particles / SPHERES) ** GROWTH
+    return seconds * float((spec.particles / SPHERES) ** GROWTH)
 
 
 def packings_of(point: Point) -> int:
@@ -168,7 +168,7 @@ def job_seconds(point: Point, csd: CrystalSizeDistribution, start: float = START
 def walltime_minutes(point: Point, csd: CrystalSizeDistribution, attempt: int = 1) -> int:
     """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry."""
     most = point.most_replicates * packing_seconds(point.spec, csd) / parallelism(point.spec)
-    minutes = (START_MINUTES + WALLTIME_FACTOR * most / MINUTE) * 2 ** (attempt - 1)
+    minutes = math.ldexp(START_MINUTES + WALLTIME_FACTOR * most / MINUTE, attempt - 1)
     return min(LONGEST_MINUTES, math.ceil(minutes))
 
 

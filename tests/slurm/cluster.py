@@ -147,16 +147,22 @@ class Cluster:
 
     def _processes(self, job: str | None = None) -> list[psutil.Process]:
         """Processes of this cluster's jobs, or of one of them."""
-        found = []
+        steps, work = {}, []
         for process in psutil.process_iter():
             with contextlib.suppress(psutil.Error):
-                of_job = process.name().startswith("slurmstepd") or "SLURM_JOB_ID" in process.environ()
-                mine = str(self.folder) in " ".join([*process.cmdline(), *process.environ().values()])
-                title = " ".join(process.cmdline())
-                same = job is None or process.environ().get("SLURM_JOB_ID") == job or f"[{job}." in title
-                if of_job and mine and same:
-                    found.append(process)
-        return found
+                environment = process.environ()
+                number = environment.get("SLURM_JOB_ID")
+                if (
+                    number is None
+                    or str(self.folder) not in " ".join(environment.values())
+                    or job not in (None, number)
+                ):
+                    continue
+                work.append(process)
+                # a step's daemon writes its title over its environment: it is known as the parent of the step's processes
+                steps |= {parent.pid: parent for parent in process.parents() if parent.name() == "slurmstepd"}
+        # the daemons first: what they live to see, they report
+        return [*steps.values(), *work]
 
     def stop(self) -> None:
         for job, state in self.jobs().items():
