@@ -159,7 +159,7 @@ class Cluster:
                 ):
                     continue
                 work.append(process)
-                # a step's daemon writes its title over its environment: it is known as the parent of the step's processes
+                # a step's daemon writes its title over its environment: it is known as the parent of the rest
                 steps |= {parent.pid: parent for parent in process.parents() if parent.name() == "slurmstepd"}
         # the daemons first: what they live to see, they report
         return [*steps.values(), *work]
