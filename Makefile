@@ -1,13 +1,14 @@
 # The two commands: make run, make test. Both set up what they need first.
 VENV ?= .venv
 CORES ?= 2
+PROFILE ?=
 STUDIES ?=
 CALIBRATION ?= pmma
 REPORT ?= results/report.html
 COUNT ?= 10000
 SEED ?= 1
 BIN := $(VENV)/bin
-SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
+SNAKEMAKE := $(BIN)/snakemake $(if $(PROFILE),--workflow-profile $(PROFILE),--cores $(CORES))
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 # calibrations that have been made; the report takes in those of its studies
 MADE := $(patsubst results/calibration_%/calibration.json,%,$(wildcard results/calibration_*/calibration.json))
@@ -19,7 +20,7 @@ REPORTED := $(if $(STUDIES)$(JOINED),--config $(if $(STUDIES),studies=$(STUDIES)
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run report browser benchmark stability reference calibrate test test-all lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability reference calibrate test test-all slurm-test lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -27,7 +28,7 @@ help:
 setup: ## create the environment; install LIGGGHTS where possible
 	@workflow/envs/setup.sh $(VENV)
 
-run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others)
+run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others; PROFILE=slurm on a cluster)
 	$(SNAKEMAKE) $(CONFIG)
 
 test: setup lint ## lint, type-check and run the fast tests
@@ -37,8 +38,12 @@ browser: setup ## the report in headless Chromium (installs Debian's chromium wh
 	@command -v chromium >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium; }
 	$(BIN)/pytest -m browser
 
-test-all: setup lint ## every test, slow ones too
-	$(BIN)/pytest -m ""
+test-all: setup lint ## every test, slow ones too (those of the browser and of clusters: make browser, make slurm-test)
+	$(BIN)/pytest -m "not slurm and not browser"
+
+slurm-test: setup ## the workflow on a private two-node Slurm (Debian's slurm-wlm is installed where root allows)
+	@workflow/envs/slurm.sh
+	$(BIN)/pytest tests/slurm -m slurm
 
 lint: setup ## ruff, mypy --strict, snakefmt, snakemake --lint
 	$(BIN)/ruff check .

@@ -39,4 +39,7 @@ onsuccess:
 
 
 onerror:
-    print(console.failure(Path(RESULTS), points_of_run(), STARTED), file=sys.stderr)
+    print(
+        console.failure(Path(RESULTS), points_of_run(), STARTED, cluster_logs()),
+        file=sys.stderr,
+    )

@@ -14,14 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from filtercake import __version__, api, bed, export
+from filtercake import __version__, api, bed, engine_choice, export
 from filtercake import cli_options as words
 from filtercake.config import Material, Packing
+from filtercake.config_loading import load_study
 from filtercake.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
+from filtercake.estimate import estimate
 from filtercake.packing.result import publish
 from filtercake.precision import half_width
-from filtercake.units import MICROMETRE
+from filtercake.study import expand
+from filtercake.units import HOUR, MICROMETRE
 
 USER_ERROR = 2
 FAILED = 1
@@ -38,6 +41,7 @@ EXAMPLES = {
     "resistance": "filtercake resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5",
     "export": "filtercake export pmma pmma_50_s50_mu0_1a2b3c4d --output report",
     "rerun": "filtercake rerun report",
+    "estimate": "filtercake estimate config/studies/pmma.yaml --cores 100",
     "porosity": "filtercake porosity packing/r0.npz --profile",
     "filter-area": (
         "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-density-kg-m3 200 "
@@ -105,6 +109,7 @@ def build_parser() -> words.Parser:
     _add_filter_area(commands)
     _add_export(commands)
     _add_rerun(commands)
+    _add_estimate(commands)
     return parser
 
 
@@ -179,6 +184,14 @@ def _add_rerun(commands: Any) -> None:
     text = "Make an exported packing once more, and print its porosity beside the first one's."
     parser = _command(commands, "rerun", _run_rerun, text)
     parser.add_argument("folder", metavar="FOLDER", help="what filtercake export wrote")
+
+
+def _add_estimate(commands: Any) -> None:
+    text = "Estimate what a study will cost before it is made: core-hours, wall time, disk."
+    parser = _command(commands, "estimate", _run_estimate, text)
+    parser.add_argument("study", metavar="STUDY", help="path of a study file")
+    parser.add_argument("--cores", metavar="N", default="1", help="cores that are kept busy. Default: 1")
+    parser.add_argument("--cluster", action="store_true", help="each point is started on a node of a cluster")
 
 
 def _run_csd(options: argparse.Namespace) -> int:
@@ -335,6 +348,28 @@ def _run_rerun(options: argparse.Namespace) -> int:
         return _print_json({**asdict(found), "first_porosity": before})
     lines: list[Line] = [("porosity, interior", found.porosity, "")]
     return _print_lines([*lines, *([("when first made", before, "")] if before is not None else [])])
+
+
+def _run_estimate(options: argparse.Namespace) -> int:
+    asked = options.cores
+    if not (asked.isascii() and asked.isdigit() and len(asked) < 10 and int(asked) > 0):
+        raise words.UsageError(f"--cores = {asked}: must be a whole number, from 1")
+    study = load_study(Path(options.study))
+    points = expand(study, engine_choice.choose)
+    csds = {name: csd.truncated for name, csd in study.csds.items()}
+    found = estimate(points, csds, on_cluster=options.cluster)
+    wall = found.wall_seconds(int(asked))
+    if options.json:
+        return _print_json({**asdict(found), "wall_seconds": wall})
+    return _print_lines(
+        [
+            ("points", found.points, ""),
+            ("packings", found.packings, ""),
+            ("core-hours", found.core_seconds / HOUR, "h"),
+            ("wall time", wall / HOUR, f"h on {asked} cores"),
+            ("disk", found.disk / 1e6, "MB"),
+        ]
+    )
 
 
 def _mean(values: list[float]) -> tuple[float, float]:

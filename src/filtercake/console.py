@@ -72,7 +72,7 @@ def _wide_intervals(summary: Path) -> Iterator[str]:
         )
 
 
-def failure(results: Path, points: Points, since: float) -> str:
+def failure(results: Path, points: Points, since: float, cluster_logs: Path | None = None) -> str:
     """Name the jobs that failed, their reasons and logs, and the command that resumes.
 
     Parameters
@@ -83,6 +83,8 @@ def failure(results: Path, points: Points, since: float) -> str:
         Points by study and name.
     since : float
         When the run started, s since the epoch: older logs speak of older runs.
+    cluster_logs : Path, optional
+        Folder of a cluster's own logs; it keeps those of submissions that failed.
     """
     lines = []
     for study in points:
@@ -96,5 +98,10 @@ def failure(results: Path, points: Points, since: float) -> str:
         lines.append(
             "\nfailed; no job says why: it was stopped from outside, or Snakemake's own message above says more"
         )
-    lines.append("\nFinished packings are kept. Resume with: make resume (or: snakemake --cores 2 --rerun-incomplete)")
+    resume = "make resume (or: snakemake --cores 2 --rerun-incomplete)"
+    if cluster_logs is not None:
+        logs = [log for log in cluster_logs.rglob("*.log") if log.stat().st_mtime >= since]
+        lines += [f"  submission's log: {log}" for log in sorted(logs)[:SHOWN]]
+        resume = "make resume PROFILE=slurm"
+    lines.append(f"\nFinished packings are kept. Resume with: {resume}")
     return "\n".join(lines)

@@ -25,6 +25,7 @@ checkpoint choose_round:
         "{results}/{calibration}/logs/rounds/{number}.log",
     benchmark:
         "{results}/{calibration}/benchmarks/rounds/{number}.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -52,6 +53,7 @@ checkpoint calibrate_cohesion:
         "{results}/{calibration}/logs/calibration.log",
     benchmark:
         "{results}/{calibration}/benchmarks/calibration.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -81,6 +83,7 @@ rule predictions:
         "{results}/{calibration}/logs/predictions.log",
     benchmark:
         "{results}/{calibration}/benchmarks/predictions.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -109,6 +112,7 @@ rule measurement_fits:
         "{results}/{calibration}/logs/fits.log",
     benchmark:
         "{results}/{calibration}/benchmarks/fits.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -142,6 +146,8 @@ rule calibration_figure:
         "{results}/{calibration}/benchmarks/figures/{figure}.tsv"
     wildcard_constraints:
         figure="|".join(calibrated.CALIBRATION_FIGURES),
+    group:
+        "figures"
     conda:
         "../envs/filtercake.yaml"
     resources:

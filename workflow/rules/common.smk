@@ -3,7 +3,7 @@
 import os
 import time
 
-from filtercake import console, engine_choice
+from filtercake import console, engine_choice, estimate
 from filtercake.calibration_config import (
     candidates as calibration_candidates,
     load_calibrations,
@@ -148,9 +148,22 @@ def csd_file(wildcards):
     return [str(file)] if file else []
 
 
+def packed_csd(wildcards):
+    """The distribution that a point packs."""
+    return study_of(wildcards).csds[point_of(wildcards).csd].truncated
+
+
 def packing_minutes(wildcards, attempt):
-    """Walltime from the packing's own limit; doubled on every retry."""
-    return min(10_080, attempt * max(30, point_of(wildcards).spec.particles // 100))
+    """Walltime from measured run times; doubled on every retry."""
+    return estimate.walltime_minutes(
+        point_of(wildcards), packed_csd(wildcards), attempt
+    )
+
+
+def packing_group(wildcards):
+    """Name of the submissions that short points share on a cluster; the profile says how many."""
+    size = estimate.group_size(point_of(wildcards), packed_csd(wildcards))
+    return f"packing_{size}" if size > 1 else None
 
 
 def points_of_run():
@@ -163,20 +176,50 @@ def points_of_run():
     return found
 
 
-def packings_to_make():
-    """Packings of the jobs that are about to run."""
-    jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name == "packing"]
-    return sum(point_of(job.wildcards).replicates for job in jobs)
+def points_to_make():
+    """Points by study whose packings are about to be made."""
+    found = {}
+    for job in workflow.dag.needrun_jobs():
+        if job.rule.name == "packing":
+            found.setdefault(job.wildcards.study, []).append(point_of(job.wildcards))
+    return found
+
+
+def cost_of(points_by_study):
+    """What the packings of points will cost."""
+    return estimate.together(
+        estimate.estimate(
+            points,
+            {name: csd.truncated for name, csd in KNOWN[study].csds.items()},
+            on_cluster=not workflow.local_exec,
+        )
+        for study, points in points_by_study.items()
+    )
+
+
+def cluster_logs():
+    """Where a cluster's own logs of this run are, None on this machine alone."""
+    return None if workflow.local_exec else Path(".snakemake/slurm_logs")
+
+
+def cores_of_run():
+    """Cores that the run may keep busy: this machine's, or those of as many submissions as the profile allows."""
+    if workflow.local_exec:
+        return workflow.cores
+    return workflow.cores * min(workflow.nodes, len(workflow.dag))
 
 
 def begin_run():
-    to_make = packings_to_make()
-    Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), to_make)
+    to_make = points_to_make()
+    packings = sum(point.replicates for group in to_make.values() for point in group)
+    Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), packings)
     for name in points_of_run():
         for warning in KNOWN[name].warnings:
             print(f"warning: {warning}", file=sys.stderr)
     if points_of_run():
-        print(console.plan(points_of_run(), to_make), file=sys.stderr)
+        print(console.plan(points_of_run(), packings), file=sys.stderr)
+    if to_make:
+        print(cost_of(to_make).words(cores_of_run()), file=sys.stderr)
 
 
 def bed_size_tables(wildcards):

@@ -11,6 +11,7 @@ rule csd:
         "{results}/{study}/logs/csd/{csd}.log",
     benchmark:
         "{results}/{study}/benchmarks/csd/{csd}.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -34,6 +35,7 @@ rule crystallizer:
         "{results}/{study}/logs/crystallizer.log",
     benchmark:
         "{results}/{study}/benchmarks/crystallizer.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:

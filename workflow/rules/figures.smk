@@ -24,6 +24,8 @@ rule figure:
         "{results}/{study}/benchmarks/figures/{figure}.tsv"
     wildcard_constraints:
         figure="|".join(catalogue.FIGURES),
+    group:
+        "figures"
     conda:
         "../envs/filtercake.yaml"
     resources:

@@ -1,4 +1,5 @@
-# All replicates of a point in one job: start-up costs as much as a small packing.
+# All replicates of a point in one job: start-up costs as much as a small packing. On a cluster, short points share a
+# submission (profiles/slurm).
 
 
 rule packing:
@@ -14,12 +15,15 @@ rule packing:
         "{results}/{study}/logs/packing/{point}.log",
     benchmark:
         "{results}/{study}/benchmarks/packing/{point}.tsv"
+    group:
+        packing_group
     conda:
         "../envs/filtercake.yaml"
     threads: lambda wildcards: parallelism(point_of(wildcards).spec)
     resources:
-        mem_mb=lambda wildcards: 1000 + point_of(wildcards).spec.particles // 50,
+        mem_mb=lambda wildcards: estimate.memory_mb(point_of(wildcards).spec),
         runtime=packing_minutes,
+        cpus_per_task=lambda wildcards: parallelism(point_of(wildcards).spec),
     params:
         spec=lambda wildcards: point_of(wildcards).spec.as_dict(),
         replicates=lambda wildcards: point_of(wildcards).replicates,

@@ -10,6 +10,7 @@ rule points:
         "{results}/{study}/logs/points.log",
     benchmark:
         "{results}/{study}/benchmarks/points.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -58,6 +59,7 @@ rule summary:
         "{results}/{study}/logs/summary.log",
     benchmark:
         "{results}/{study}/benchmarks/summary.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -84,6 +86,7 @@ rule tables:
         "{results}/{study}/logs/tables.log",
     benchmark:
         "{results}/{study}/benchmarks/tables.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -108,6 +111,7 @@ rule filter_design:
         "{results}/{study}/logs/filter.log",
     benchmark:
         "{results}/{study}/benchmarks/filter.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -142,6 +146,7 @@ rule provenance:
         "{results}/{study}/logs/provenance.log",
     benchmark:
         "{results}/{study}/benchmarks/provenance.tsv"
+    localrule: True
     conda:
         "../envs/filtercake.yaml"
     resources:
