@@ -6,6 +6,8 @@ CALIBRATION ?= pmma
 BIN := $(VENV)/bin
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
+# a calibration where one is named, studies otherwise
+RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(CONFIG),calibrate --config calibrations=$(CALIBRATION))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
@@ -89,9 +91,8 @@ references: setup ## remake the stored LIGGGHTS trajectories that the tests comp
 	$(BIN)/python tests/data/force_scenes.py
 	$(BIN)/python tests/data/make_liggghts_data.py
 
-resume: setup ## go on after a kill or a crash; finished packings are kept
-	$(BIN)/snakemake --unlock $(CONFIG) >/dev/null 2>&1 || true
-	$(SNAKEMAKE) $(CONFIG) --rerun-incomplete
+resume: setup ## go on after a kill, a crash or damage, with the same STUDIES or CALIBRATION; finished packings are kept
+	$(BIN)/python -m filtercake.resume --cores $(CORES) $(RESUMED)
 
 retry: setup ## make the packings that failed once more
 	$(BIN)/python -m filtercake.retry results

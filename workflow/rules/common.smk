@@ -14,7 +14,7 @@ from filtercake.calibration_config import (
 from filtercake.config_loading import find_studies, load_studies, load_workflow
 from filtercake.errors import FiltercakeError
 from filtercake.figures import calibrated, catalogue
-from filtercake.job import PROGRESS_VARIABLE, Progress
+from filtercake.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
 from filtercake.packing.result import read_record
@@ -66,6 +66,7 @@ KNOWN = dict(STUDIES)
 KNOWN_POINTS = dict(POINTS)
 RESULTS = settings.results
 STARTED = time.time()
+os.environ[FOLDER_VARIABLE] = str(Path.cwd().resolve())
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
 
 
@@ -175,7 +176,12 @@ def packings_to_make():
 
 def begin_run():
     to_make = packings_to_make()
-    Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), to_make)
+    try:
+        Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), to_make)
+    except OSError as error:
+        raise WorkflowError(
+            f"the results folder {RESULTS} cannot be written: {error.strerror}"
+        )
     for name in points_of_run():
         for warning in KNOWN[name].warnings:
             print(f"warning: {warning}", file=sys.stderr)
