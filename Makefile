@@ -3,6 +3,8 @@ VENV ?= .venv
 CORES ?= 2
 STUDIES ?=
 CALIBRATION ?= pmma
+COUNT ?= 200
+SEED ?= 1
 BIN := $(VENV)/bin
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
@@ -11,7 +13,7 @@ RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(CONFIG),calibrate --confi
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run benchmark stability reference calibrate test test-all lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run benchmark stability faults reference calibrate test test-all lint format schemas figures regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -60,6 +62,10 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.md docs/)
 	$(if $(QUICK),,install -m 644 results/benchmark/images/stability_maps.png docs/images/)
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.csv docs/data/)
+
+faults: setup ## hurt small sweeps in COUNT ways and resume them: docs/reliability.md (about 1 h; goes on where it was stopped)
+	$(BIN)/python tests/faults/campaign.py --count $(COUNT) --seed $(SEED) --rows results/faults.csv --page docs/reliability.md
+	install -m 644 results/faults.csv docs/data/
 
 reference: setup ## remake the reference ensembles of docs/data (about 2 h on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) reference
