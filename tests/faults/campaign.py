@@ -37,8 +37,8 @@ FAKES = (
     *("sphere_outside", "sphere_twice", "hangs"),
 )
 WAYS = ("empty", "truncated", "bit_flipped", "garbage")
-PER_SWEEP = {"damage": len(WAYS) * 3, "killed_programs": 14, "failing_programs": 13}
-"""Faults that hit one sweep before it is compared; 8 where nothing is said."""
+PER_SWEEP = {"signals": 23, "damage": 32}
+"""Faults that hit one sweep before it is compared; 40 where nothing is said."""
 ENDED = 240.0
 """Seconds that a run which was hurt has to end."""
 
@@ -124,7 +124,9 @@ def signals(trial: Trial, count: int) -> None:
             with contextlib.suppress(psutil.Error):
                 trial.rng.choice(jobs).send_signal(sign)
         else:
-            wait_for(lambda: not trial.sweep.alive(), trial.rng.uniform(2.0, 16.0))
+            if trial.rng.random() < 0.7:
+                wait_for(lambda: trial.sweep.jobs() or not trial.sweep.alive(), ENDED)
+            wait_for(lambda: not trial.sweep.alive(), trial.rng.uniform(0.0, 6.0))
             trial.remember()
             if not trial.sweep.alive():
                 trial.sweep.clear()
@@ -161,9 +163,8 @@ def failing_programs(trial: Trial, count: int) -> None:
     """A LIGGGHTS that fails in many ways: garbage, wrong version, hanging, out of memory, dead with status 0."""
     trial.sweep.clear()
     ways = [way for way in FAKES if way != "hangs"]
-    chosen = trial.rng.sample(ways, min(count, len(ways)))
-    if trial.rng.random() < 0.5:
-        chosen[trial.rng.randrange(len(chosen))] = "hangs"
+    chosen = ["hangs", "hangs", *itertools.islice(itertools.cycle(ways), max(0, count - 2))][:count]
+    trial.rng.shuffle(chosen)
     listed = trial.sweep.root / "ways"
     listed.with_suffix(".used").unlink(missing_ok=True)
     listed.write_text("\n".join(chosen))
@@ -226,7 +227,7 @@ def damage(trial: Trial, count: int) -> None:
         trial.sweep.clear()
         trial.sweep.start()
         wait_for(lambda: trial.sweep.packings() or not trial.sweep.alive(), ENDED)
-        wait_for(lambda: not trial.sweep.alive(), trial.rng.uniform(0.0, 25.0))
+        wait_for(lambda: not trial.sweep.alive(), trial.rng.uniform(0.0, 40.0))
         trial.sweep.signal_group(signal.SIGKILL)
         trial.sweep.wait(ENDED)
         for process in trial.sweep.members():
@@ -234,8 +235,10 @@ def damage(trial: Trial, count: int) -> None:
                 process.kill()
     trial.remember()
     there = {name: files for name, find in STAGES.items() if (files := find(trial.sweep))}
-    for name in trial.rng.sample(sorted(there), min(count, len(there))):
-        path, way = trial.rng.choice(there[name]), trial.rng.choice(WAYS)
+    while there and count > len(trial.faults):
+        name, way = trial.rng.choice(sorted(there)), trial.rng.choice(WAYS)
+        path = there[name].pop(trial.rng.randrange(len(there[name])))
+        there = {stage: files for stage, files in there.items() if files}
         spoil(path, way, trial.rng)
         if name in ("packing", "record"):
             trial.spoiled.add(f"{path.stem}.npz")
@@ -279,8 +282,8 @@ def _stale_marker(sweep: Sweep) -> list[Path]:
 
 STAGES: dict[str, Callable[[Sweep], list[Path]]] = {
     "csd": _results("csd/*.csv"),
-    "packing": _results("packings/*/r?.npz"),
-    "record": _results("packings/*/r?.json"),
+    "packing": _results("packings/*/r*.npz"),
+    "record": _results("packings/*/r[0-9]*.json"),
     "manifest": _results("packings/*/replicates.json"),
     "replicates.csv": _results("replicates.csv"),
     "summary.csv": _results("summary.csv"),
@@ -384,7 +387,7 @@ FAMILIES: dict[str, tuple[Callable[[Trial, int], None], tuple[str, ...], float]]
     # what is done, the engines it is done to, the share of all faults
     "signals": (signals, ("liggghts", "embedded"), 0.22),
     "killed_programs": (killed_programs, ("liggghts",), 0.14),
-    "failing_programs": (failing_programs, ("liggghts",), 0.195),
+    "failing_programs": (failing_programs, ("liggghts",), 0.18),
     "missing_program": (missing_program, ("liggghts",), 0.02),
     "short_memory": (short_memory, ("embedded",), 0.03),
     "damage": (damage, ("liggghts", "embedded"), 0.30),
@@ -440,7 +443,7 @@ def plan(count: int) -> list[tuple[str, str, int]]:
     """Family, engine and number of faults of every sweep."""
     rounds = []
     for name, (_, engines, share) in FAMILIES.items():
-        wanted, engine, size = max(1, round(share * count)), itertools.cycle(engines), PER_SWEEP.get(name, 8)
+        wanted, engine, size = max(1, round(share * count)), itertools.cycle(engines), PER_SWEEP.get(name, 40)
         while wanted > 0:
             rounds.append((name, next(engine), min(size, wanted)))
             wanted -= size

@@ -54,7 +54,7 @@ class Sweep:
         study = root / STUDY
         study.write_text(study.read_text().replace("engine: liggghts", f"engine: {engine}"))
         (root / "tmp").mkdir(exist_ok=True)
-        sweep = cls(root, engine)
+        sweep = cls(root, engine, TABLES_ONLY)
         if sweep.resume() != 0:
             raise RuntimeError(f"the undisturbed run failed: {sweep.output()}")
         sweep.reference = sweep.tables()
