@@ -24,7 +24,7 @@ from typing import Any
 
 import pandas as pd
 import psutil
-from sweep import STUDY, TABLES_ONLY, Sweep, wait_for
+from sweep import TABLES_ONLY, Sweep, wait_for
 
 from filtercake import pages
 from filtercake.packing.engines.liggghts import EXECUTABLE_VARIABLE, find_executable
@@ -172,7 +172,11 @@ def failing_programs(trial: Trial, count: int) -> None:
     shutil.copy(Path(__file__).with_name("fake_liggghts.py"), fake)
     fake.chmod(0o755)
     began, started = time.time(), time.monotonic()
-    variables = {EXECUTABLE_VARIABLE: str(fake), "FAULTS_REAL_LIGGGHTS": find_executable() or "", "FAULTS_LIST": str(listed)}
+    variables = {
+        EXECUTABLE_VARIABLE: str(fake),
+        "FAULTS_REAL_LIGGGHTS": find_executable() or "",
+        "FAULTS_LIST": str(listed),
+    }
     trial.sweep.start(**variables)
     trial.sweep.wait(ENDED)
     trial.remember()
@@ -203,7 +207,7 @@ def missing_program(trial: Trial, count: int) -> None:
 def short_memory(trial: Trial, count: int) -> None:
     """A limit on the address space of a script's Python, or its end by the kernel's out-of-memory killer."""
     trial.sweep.clear()
-    for index in range(count):
+    for _ in range(count):
         trial.sweep.start()
         started = time.monotonic()
         jobs = wait_for(lambda: trial.sweep.jobs() or not trial.sweep.alive(), ENDED)
@@ -399,7 +403,6 @@ FAMILIES: dict[str, tuple[Callable[[Trial, int], None], tuple[str, ...], float]]
 WITH_FIGURES = ("damage",)
 SELF_JUDGED = ("full_disk", "read_only")
 """Families that are compared while their disk is mounted."""
-MOUNTING = SELF_JUDGED
 
 
 def mount(*arguments: str, check: bool = True) -> int:
@@ -478,7 +481,7 @@ def run(options: argparse.Namespace, work: Path) -> None:
         if engine == "liggghts" and find_executable() is None:
             print(f"{name}: left out, LIGGGHTS is not installed", flush=True)
             continue
-        if name in MOUNTING and not may_mount():
+        if name in SELF_JUDGED and not may_mount():
             print(f"{name}: left out, only root may mount a disk", flush=True)
             continue
         if engine not in sweeps:

@@ -26,21 +26,21 @@ def sleeper():
     started = []
 
     def start(code, folder, *command, **variables):
-        process = subprocess.Popen(
+        running = subprocess.Popen(
             [*(command or (sys.executable, "-c", code))],
             cwd=folder,
             env={**os.environ, **variables},
             stdout=subprocess.PIPE,
         )
-        started.append(process)
-        assert process.stdout.readline()
-        return process
+        started.append(running)
+        assert running.stdout.readline()
+        return running
 
     yield start
-    for process in started:
-        process.kill()
-        process.wait()
-        process.stdout.close()
+    for each in started:
+        each.kill()
+        each.wait()
+        each.stdout.close()
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ def test_a_flipped_bit_of_a_packing_costs_its_manifest(study, name):
 def test_a_changed_number_in_a_record_is_noticed(study):
     record = study / "packings/p/r0.json"
     record.write_text(record.read_text().replace('"overlap_max": 0.01', '"overlap_max": 0.02'))
-    with pytest.raises(PackingRejected, match="r0.json is not the record that was written"):
+    with pytest.raises(PackingRejected, match=r"r0\.json is not the record that was written"):
         Packing.load(study / "packings/p/r0.npz")
     with pytest.raises(PackingRejected):
         read_sealed(record)
@@ -167,9 +167,9 @@ def test_orphans_are_ended_even_stubborn_ones(study, sleeper, monkeypatch):
     ours = [sleeper(code, "/", **{FOLDER_VARIABLE: str(folder)}) for code in (SLEEP, STUBBORN)]
     other = sleeper(SLEEP, "/", **{FOLDER_VARIABLE: str(folder / "another")})
     lines = list(resume.prepare(folder, study.parent))
-    assert [f"process {process.pid}" in " ".join(lines) for process in ours] == [True, True]
+    assert [f"process {orphan.pid}" in " ".join(lines) for orphan in ours] == [True, True]
     # reaped by the wait for them: their status is not known here
-    assert all(process.wait(5) is not None for process in ours)
+    assert all(orphan.wait(5) is not None for orphan in ours)
     assert other.poll() is None
 
 
@@ -182,7 +182,7 @@ def test_a_live_run_is_not_disturbed(study, sleeper):
     lock.write_text("x")
     running = sleeper("", folder, sys.executable, str(program))
     sleeper("", "/", sys.executable, str(program))
-    assert [process.pid for process in resume.live_runs(folder)] == [running.pid]
+    assert [found.pid for found in resume.live_runs(folder)] == [running.pid]
     with pytest.raises(resume.RunGoesOn, match=f"process {running.pid}"):
         list(resume.prepare(folder, study.parent))
     assert lock.exists() and running.poll() is None
@@ -190,9 +190,8 @@ def test_a_live_run_is_not_disturbed(study, sleeper):
     (folder / "config/config.yaml").write_text("studies: [demo]\n")
     done = subprocess.run([sys.executable, "-m", "filtercake.resume"], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 1 and lock.exists()
-    assert done.stderr == (
-        f"filtercake cannot resume: a run is going on in {folder} (process {running.pid}); wait for it, or end it first\n"
-    )
+    why = f"a run is going on in {folder} (process {running.pid}); wait for it, or end it first"
+    assert done.stderr == f"filtercake cannot resume: {why}\n"
 
 
 def test_results_folder_is_that_of_the_command_or_the_configuration(tmp_path, monkeypatch):
@@ -218,4 +217,3 @@ def test_only_failures_that_may_pass_are_forgotten(study):
 def test_temporary_files_of_a_program_go_with_its_folder(tmp_path):
     process.run(["sh", "-c", "echo $TMPDIR"], tmp_path, tmp_path / "out")
     assert (tmp_path / "out").read_text().strip() == str(tmp_path)
-
