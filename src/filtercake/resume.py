@@ -28,6 +28,8 @@ from filtercake.retry import forget, forget_failures
 
 GRACE_SECONDS = 15.0
 """Wall time that a process left over has to end by itself."""
+MADE = ("*.csv", "*.json", "csd/*", "tables/*", "figures/*", "rounds/*")
+"""What the jobs of a study or calibration make in its folder, besides packings."""
 CONFIG_FILE = "config/config.yaml"
 
 
@@ -125,13 +127,31 @@ def forget_spoiled(results: Path) -> list[Path]:
     for manifest in sorted(results.glob(f"*/packings/*/{MANIFEST}")):
         if not whole(manifest):
             found.append(manifest)
-            forget(manifest)
+    for noted in damaged_checksums(results):
+        found += [noted, *unverified(noted)]
+        noted.unlink()
+    for path in found:
+        forget(path)
     for noted in sorted(results.glob(f"*/logs/**/*{checksums.SUFFIX}")):
         bad = checksums.spoiled(noted) if noted.exists() else []
         found += bad
         for path in bad:
             forget(path)
     return found
+
+
+def damaged_checksums(results: Path) -> list[Path]:
+    """Files of checksums that are not what was written."""
+    return [path for path in sorted(results.glob(f"*/logs/**/*{checksums.SUFFIX}")) if not _readable(path)]
+
+
+def unverified(noted: Path) -> list[Path]:
+    """Files of a study that no checksum vouches for when that file of checksums is damaged."""
+    study = next(parent.parent for parent in noted.parents if parent.name == "logs")
+    good = [path for path in (study / "logs").rglob(f"*{checksums.SUFFIX}") if _readable(path)]
+    known = {output for path in good for output in checksums.read(path)}
+    made = [path for pattern in MADE for path in study.glob(pattern) if path.is_file()]
+    return [path for path in made if path not in known] if (study / "packings").is_dir() else []
 
 
 def results_folder(arguments: list[str]) -> Path:
@@ -195,6 +215,14 @@ def _started_from(process: psutil.Process, folder: Path) -> bool:
         return process.environ().get(FOLDER_VARIABLE) == str(folder.resolve())
     except (psutil.Error, OSError):
         return False
+
+
+def _readable(noted: Path) -> bool:
+    try:
+        checksums.read(noted)
+    except checksums.ChecksumsDamaged:
+        return False
+    return True
 
 
 def _is_object(path: Path) -> bool:

@@ -144,7 +144,10 @@ class Sweep:
         found = {}
         for path in files:
             if path.exists():
-                lines = pd.read_csv(path, dtype=str, keep_default_na=False)
+                try:
+                    lines = pd.read_csv(path, dtype=str, keep_default_na=False)
+                except ValueError:
+                    continue
                 found[path.name] = lines.drop(columns="wall_s", errors="ignore").to_csv(index=False)
         return found
 

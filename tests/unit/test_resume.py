@@ -117,8 +117,19 @@ def test_a_changed_number_in_a_record_is_noticed(study):
 def test_checksums_are_those_of_sha256sum(study):
     done = subprocess.run(["sha256sum", "-c", "p.sha256"], cwd=study / "logs/packing", capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    (study / "logs/packing/p.sha256").write_bytes(b"\xff\x00 garbage\n")
-    assert checksums.read(study / "logs/packing/p.sha256") == {}
+
+
+@pytest.mark.parametrize("damage", [flip, lambda path: path.write_text(""), lambda path: path.write_bytes(b"\xff\x00")])
+def test_damaged_checksums_vouch_for_nothing(study, damage):
+    noted = study / "logs/summary.csv.sha256"
+    damage(noted)
+    with pytest.raises(checksums.ChecksumsDamaged):
+        checksums.read(noted)
+    (study / "notes.txt").write_text("the user's own")
+    list(resume.prepare(study.parents[1], study.parent))
+    left = names(study)
+    assert not left & {"summary.csv", "replicates.csv", "provenance.json", "logs/summary.csv.sha256"}
+    assert {"notes.txt", "packings/p/r0.npz", f"packings/p/{MANIFEST}"} <= left
 
 
 def test_a_job_that_fails_notes_no_checksums(study):
