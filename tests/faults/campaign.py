@@ -461,6 +461,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="decides moments and kinds (default: 1)")
     parser.add_argument("--rows", type=Path, default=Path("results/faults.csv"), help="table to make or to go on with")
     parser.add_argument("--family", choices=tuple(FAMILIES), action="append", help="only these")
+    parser.add_argument("--engine", choices=("liggghts", "embedded"), help="only this one")
     parser.add_argument("--page", type=Path, help="page to make of the table")
     parser.add_argument("--work", type=Path, help="scratch folder (default: a temporary one)")
     options = parser.parse_args()
@@ -477,7 +478,7 @@ def run(options: argparse.Namespace, work: Path) -> None:
     done = {row["round"] for row in rows}
     sweeps: dict[str, Sweep] = {}
     for index, (name, engine, count) in enumerate(plan(options.count)):
-        if index in done or (options.family and name not in options.family):
+        if index in done or name not in (options.family or FAMILIES) or engine != (options.engine or engine):
             continue
         if engine == "liggghts" and find_executable() is None:
             print(f"{name}: left out, LIGGGHTS is not installed", flush=True)

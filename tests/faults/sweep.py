@@ -171,7 +171,9 @@ class Sweep:
         state = self.root / ".snakemake"
         files = [*remains(self.root / "results"), *state.glob("locks/*"), *state.glob("scripts/tmp*")]
         files += [path for path in state.glob("incomplete/**/*") if path.is_file()]
-        files += list((self.root / "tmp").iterdir())
+        # a killed Snakemake leaves its scratch folder, empty
+        files += [path for path in (self.root / "tmp").rglob("*") if path.is_file() or path.parent.name != "tmp"]
+        files += [path for path in (self.root / "tmp").iterdir() if not path.name.startswith("snakemake")]
         processes = [f"process {process.pid}" for process in (*self.members(), *live_runs(self.root))]
         return [*processes, *(str(path.relative_to(self.root)) for path in files)]
 

@@ -101,7 +101,7 @@ def test_garbage_with_a_matching_checksum_is_still_refused(packing: Packing, tmp
 def test_an_archive_without_radii_is_refused(tmp_path: Path) -> None:
     npz = tmp_path / "r0.npz"
     np.savez(npz, position=np.zeros((1, 3)))
-    write_json(tmp_path / "r0.json", {"sha256": sha256(npz)})
+    write_json(tmp_path / "r0.json", sealed({"sha256": sha256(npz)}))
     with pytest.raises(PackingRejected, match="cannot be read"):
         Packing.load(npz)
 
