@@ -1,10 +1,13 @@
 """What a killed run leaves is cleared away, what is damaged is found, and a run that goes on is left alone."""
 
+import fcntl
 import os
 import random
+import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +19,7 @@ from filtercake.packing.pack import MANIFEST, whole
 from filtercake.packing.result import Packing, publish, read_sealed, sealed, write_json
 from filtercake.retry import forget_failures
 
+PROJECT = Path(__file__).resolve().parents[2]
 SLEEP = "import time; print('ready', flush=True); time.sleep(60)"
 STUBBORN = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); " + SLEEP
 
@@ -228,3 +232,28 @@ def test_only_failures_that_may_pass_are_forgotten(study):
 def test_temporary_files_of_a_program_go_with_its_folder(tmp_path):
     process.run(["sh", "-c", "echo $TMPDIR"], tmp_path, tmp_path / "out")
     assert (tmp_path / "out").read_text().strip() == str(tmp_path)
+
+
+def test_of_two_that_resume_at_once_one_goes_on(tmp_path):
+    (tmp_path / ".snakemake").mkdir()
+    with (tmp_path / ".snakemake/resume.lock").open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        done = subprocess.run([sys.executable, "-m", "filtercake.resume"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == f"filtercake cannot resume: a run is going on in {tmp_path}\n"
+
+
+@pytest.mark.parametrize(
+    ("given", "arguments"),
+    [
+        ([], "--cores 2"),
+        (["STUDIES=a,b", "CORES=3"], "--cores 3 --config studies=a,b"),
+        (["CALIBRATION=pmma"], "--cores 2 calibrate --config calibrations=pmma"),
+    ],
+)
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_make_resume_takes_what_the_run_took(given, arguments):
+    command = ["make", "--dry-run", "resume", *given]
+    plain = {"PATH": os.environ["PATH"]}  # a make above this one must not pass its own values on
+    done = subprocess.run(command, cwd=PROJECT, env=plain, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].split("filtercake.resume ")[1].strip() == arguments
