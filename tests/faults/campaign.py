@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import itertools
+import math
 import os
 import random
 import shutil
@@ -71,6 +72,11 @@ class Trial:
     finished: dict[str, tuple[int, str]] = field(default_factory=dict)
     spoiled: set[str] = field(default_factory=set)
     accepted: int = 0
+    until: float = math.inf
+
+    def overdue(self) -> bool:
+        """Whether the time for this sweep is over."""
+        return time.monotonic() > self.until
 
     def hit(self, kind: str, target: str, since: float, noticed: str = "") -> Fault:
         """Note a fault."""
@@ -102,43 +108,38 @@ class Trial:
 
 
 def signals(trial: Trial, count: int) -> None:
-    """Signals to Snakemake, to a script's Python and to the whole group, at random moments."""
+    """Signals to Snakemake, to a script's Python and to the whole group, at random moments; some hit a run again."""
     listed = list(itertools.product(("snakemake", "script", "group"), SIGNALS))
     trial.rng.shuffle(listed)
     pairs = itertools.cycle(listed)
     trial.sweep.clear()
-    while len(trial.faults) < count:
-        target, name = next(pairs)
-        sign = getattr(signal, name)
+    while len(trial.faults) < count and not trial.overdue():
         trial.sweep.start()
         started = time.monotonic()
-        if target == "script":
+        if trial.rng.random() < 0.7:
             wait_for(lambda: trial.sweep.jobs() or not trial.sweep.alive(), ENDED)
-            time.sleep(trial.rng.uniform(0.0, 3.0))
-            jobs = wait_for(lambda: trial.sweep.jobs() or not trial.sweep.alive(), ENDED)
-            if jobs is True or not jobs:
-                trial.sweep.wait(ENDED)
-                trial.sweep.clear()  # it was finished before it could be hit: the next starts anew
-                trial.finished.clear()
-                continue
-            trial.remember()
-            with contextlib.suppress(psutil.Error):
-                trial.rng.choice(jobs).send_signal(sign)
+        while not wait_for(lambda: not trial.sweep.alive(), trial.rng.uniform(0.0, 6.0)) and len(trial.faults) < count:
+            strike(trial, *next(pairs), started)
+        if trial.sweep.wait(ENDED) == 0:  # at its end in spite of all: the next starts anew
+            trial.sweep.clear()
+            trial.finished.clear()
+
+
+def strike(trial: Trial, target: str, name: str, started: float) -> None:
+    """Send one signal, where its target is there."""
+    jobs = trial.sweep.jobs()
+    if target == "script" and not jobs:
+        return
+    trial.remember()
+    sign = getattr(signal, name)
+    with contextlib.suppress(psutil.Error):
+        if target == "script":
+            trial.rng.choice(jobs).send_signal(sign)
+        elif target == "snakemake":
+            trial.sweep.running.send_signal(sign)
         else:
-            if trial.rng.random() < 0.7:
-                wait_for(lambda: trial.sweep.jobs() or not trial.sweep.alive(), ENDED)
-            wait_for(lambda: not trial.sweep.alive(), trial.rng.uniform(0.0, 6.0))
-            trial.remember()
-            if not trial.sweep.alive():
-                trial.sweep.clear()
-                trial.finished.clear()
-                continue
-            if target == "snakemake":
-                trial.sweep.running.send_signal(sign)
-            else:
-                trial.sweep.signal_group(sign)
+            trial.sweep.signal_group(sign)
         trial.hit(name, target, started)
-        trial.sweep.wait(ENDED)
 
 
 def killed_programs(trial: Trial, count: int) -> None:
@@ -432,11 +433,11 @@ def may_mount() -> bool:
     return True
 
 
-def run_family(name: str, sweep: Sweep, count: int, rng: random.Random) -> list[Fault]:
-    """Inject a number of faults of one family into a sweep, compare, and return them."""
+def run_family(name: str, sweep: Sweep, count: int, rng: random.Random, minutes: float = math.inf) -> list[Fault]:
+    """Inject a number of faults of one family into a sweep, compare, and return them; signals end after so long."""
     attack, _, _ = FAMILIES[name]
     sweep.targets = () if name in WITH_FIGURES else TABLES_ONLY
-    trial = Trial(sweep, rng, name)
+    trial = Trial(sweep, rng, name, until=time.monotonic() + 60.0 * minutes)
     attack(trial, count)
     if name not in SELF_JUDGED:
         trial.judge()
@@ -461,6 +462,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="decides moments and kinds (default: 1)")
     parser.add_argument("--rows", type=Path, default=Path("results/faults.csv"), help="table to make or to go on with")
     parser.add_argument("--family", choices=tuple(FAMILIES), action="append", help="only these")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="time for the signals of one sweep")
     parser.add_argument("--engine", choices=("liggghts", "embedded"), help="only this one")
     parser.add_argument("--page", type=Path, help="page to make of the table")
     parser.add_argument("--work", type=Path, help="scratch folder (default: a temporary one)")
@@ -489,7 +491,7 @@ def run(options: argparse.Namespace, work: Path) -> None:
         if engine not in sweeps:
             sweeps[engine] = Sweep.make(work / engine, engine)
         began = time.monotonic()
-        faults = run_family(name, sweeps[engine], count, random.Random(f"{options.seed} {index}"))
+        faults = run_family(name, sweeps[engine], count, random.Random(f"{options.seed} {index}"), options.minutes)
         rows += [{"round": index, **asdict(fault)} for fault in faults]
         options.rows.parent.mkdir(parents=True, exist_ok=True)
         pd.DataFrame(rows).to_csv(options.rows, index=False)

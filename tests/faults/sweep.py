@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import shutil
 import signal
@@ -55,9 +56,13 @@ class Sweep:
         study.write_text(study.read_text().replace("engine: liggghts", f"engine: {engine}"))
         (root / "tmp").mkdir(exist_ok=True)
         sweep = cls(root, engine, TABLES_ONLY)
-        if sweep.resume() != 0:
-            raise RuntimeError(f"the undisturbed run failed: {sweep.output()}")
-        sweep.reference = sweep.tables()
+        undisturbed = root / "undisturbed.json"
+        if not undisturbed.exists():
+            sweep.clear()
+            if sweep.resume() != 0:
+                raise RuntimeError(f"the undisturbed run failed: {sweep.output()}")
+            undisturbed.write_text(json.dumps(sweep.tables()))
+        sweep.reference = json.loads(undisturbed.read_text())
         return sweep
 
     @property
