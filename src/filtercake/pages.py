@@ -138,7 +138,7 @@ def reliability(template: Path, table: pd.DataFrame) -> str:
     template : Path
         The page's prose.
     table : DataFrame
-        One row per fault: family, kind, target, engine, lost, accepted, left, commands, equal.
+        One row per fault: seed, round (the sweep it hit), family, kind, target, engine, lost, accepted, left, commands, equal.
     """
     groups = {str(name): group for name, group in table.groupby("family", sort=False)}
     return _render(
@@ -155,7 +155,7 @@ def reliability(template: Path, table: pd.DataFrame) -> str:
 
 def _outcome(rows: pd.DataFrame) -> dict[str, int]:
     """Count faults and what became of them; a sweep's outcome is counted once for all faults that hit it."""
-    sweeps = rows.drop_duplicates("round")
+    sweeps = rows.drop_duplicates(["seed", "round"])
     return {
         "faults": len(rows),
         "sweeps": len(sweeps),

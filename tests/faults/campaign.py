@@ -477,7 +477,7 @@ def main() -> None:
 def run(options: argparse.Namespace, work: Path) -> None:
     """Run the rounds that are not in the table yet."""
     rows: list[dict[str, Any]] = pd.read_csv(options.rows).to_dict("records") if options.rows.exists() else []
-    done = {row["round"] for row in rows}
+    done = {row["round"] for row in rows if row["seed"] == options.seed}
     sweeps: dict[str, Sweep] = {}
     for index, (name, engine, count) in enumerate(plan(options.count)):
         if index in done or name not in (options.family or FAMILIES) or engine != (options.engine or engine):
@@ -492,7 +492,7 @@ def run(options: argparse.Namespace, work: Path) -> None:
             sweeps[engine] = Sweep.make(work / engine, engine)
         began = time.monotonic()
         faults = run_family(name, sweeps[engine], count, random.Random(f"{options.seed} {index}"), options.minutes)
-        rows += [{"round": index, **asdict(fault)} for fault in faults]
+        rows += [{"seed": options.seed, "round": index, **asdict(fault)} for fault in faults]
         options.rows.parent.mkdir(parents=True, exist_ok=True)
         pd.DataFrame(rows).to_csv(options.rows, index=False)
         bad = sum(not fault.equal or fault.lost + fault.accepted + fault.left > 0 for fault in faults)

@@ -146,9 +146,9 @@ def test_figures_draw_every_case() -> None:
 def test_the_reliability_page_counts_a_sweep_once() -> None:
     good = {"lost": 0, "accepted": 0, "left": 0, "commands": 1, "equal": True}
     rows = [
-        {"round": 0, "family": "signals", "kind": "SIGKILL", "target": "group", **good},
-        {"round": 0, "family": "signals", "kind": "SIGINT", "target": "script", **good},
-        {"round": 1, "family": "damage", "kind": "bit_flipped", "target": "csd", **good},
+        {"seed": 1, "round": 0, "family": "signals", "kind": "SIGKILL", "target": "group", **good},
+        {"seed": 1, "round": 0, "family": "signals", "kind": "SIGINT", "target": "script", **good},
+        {"seed": 1, "round": 1, "family": "damage", "kind": "bit_flipped", "target": "csd", **good},
     ]
     page = pages.reliability(TEMPLATES / "reliability.md.j2", pd.DataFrame(rows))
     assert "3 faults injected into 2 real small sweeps" in page
