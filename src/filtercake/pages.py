@@ -138,7 +138,8 @@ def reliability(template: Path, table: pd.DataFrame) -> str:
     template : Path
         The page's prose.
     table : DataFrame
-        One row per fault: seed, round (the sweep it hit), family, kind, target, engine, lost, accepted, left, commands, equal.
+        One row per fault: seed and round (the sweep it hit), family, kind, target, lost, accepted, left, commands,
+        equal.
     """
     groups = {str(name): group for name, group in table.groupby("family", sort=False)}
     return _render(
