@@ -52,7 +52,7 @@ def test_a_killed_run_resumes_and_gives_the_tables_of_an_undisturbed_one(embedde
         stderr=subprocess.DEVNULL,
     )
     try:
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + 300
         while len(list(results.glob("packings/*/r[0-9].json"))) < 3 and time.monotonic() < deadline:
             time.sleep(0.05)
     finally:
