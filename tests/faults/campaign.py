@@ -69,7 +69,7 @@ class Trial:
     rng: random.Random
     family: str
     faults: list[Fault] = field(default_factory=list)
-    finished: dict[str, tuple[int, str]] = field(default_factory=dict)
+    finished: dict[str, str] = field(default_factory=dict)
     spoiled: set[str] = field(default_factory=set)
     accepted: int = 0
     until: float = math.inf
@@ -349,10 +349,6 @@ def clocks(trial: Trial, count: int) -> None:
             name = trial.rng.choice(sorted(set(listed) - {"incomplete_marker"}))
             for path in listed[name]:
                 os.utime(path, (path.stat().st_atime, time.time() + 3600 * hours))
-                if path.suffix == ".npz" and path.name in trial.finished:
-                    trial.finished[path.name] = (path.stat().st_mtime_ns, trial.finished[path.name][1])
-            if name == "packing":  # dates that are set to now again are no loss
-                trial.finished.clear()
             trial.hit(f"files_{hours:+d}h", name, started)
             continue
         trial.sweep.start("faketime", "-f", f"{hours:+d}h")
