@@ -5,10 +5,10 @@ PROFILE ?=
 STUDIES ?=
 CALIBRATION ?= pmma
 REPORT ?= results/report.html
-COUNT ?= 10000
 SEED ?= 1
 BIN := $(VENV)/bin
-SNAKEMAKE := $(BIN)/snakemake $(if $(PROFILE),--workflow-profile $(PROFILE),--cores $(CORES))
+PLACE := $(if $(PROFILE),--workflow-profile $(PROFILE),--cores $(CORES))
+SNAKEMAKE := $(BIN)/snakemake $(PLACE)
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 # calibrations that have been made; the report takes in those of its studies
 MADE := $(patsubst results/calibration_%/calibration.json,%,$(wildcard results/calibration_*/calibration.json))
@@ -18,9 +18,12 @@ space := $() $()
 JOINED := $(subst $(space),$(comma),$(strip $(CALIBRATIONS)))
 REPORTED := $(if $(STUDIES)$(JOINED),--config $(if $(STUDIES),studies=$(STUDIES)) $(if $(JOINED),calibrations=$(JOINED)))
 
+# a calibration where one is named, studies otherwise
+RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(CONFIG),calibrate --config calibrations=$(CALIBRATION))
+
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run report browser benchmark stability reference calibrate test test-all slurm-test lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability faults reference calibrate test test-all slurm-test lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -38,8 +41,8 @@ browser: setup ## the report in headless Chromium (installs Debian's chromium wh
 	@command -v chromium >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium; }
 	$(BIN)/pytest -m browser
 
-test-all: setup lint ## every test, slow ones too (those of the browser and of clusters: make browser, make slurm-test)
-	$(BIN)/pytest -m "not slurm and not browser"
+test-all: setup lint ## every test, slow ones too (but make browser, make slurm-test, make faults)
+	$(BIN)/pytest -m "not slurm and not browser and not faults"
 
 slurm-test: setup ## the workflow on a private two-node Slurm (Debian's slurm-wlm is installed where root allows)
 	@workflow/envs/slurm.sh
@@ -83,6 +86,10 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 	$(if $(QUICK),,install -m 644 results/benchmark/images/stability_maps.png docs/images/)
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.csv docs/data/)
 
+faults: setup ## hurt small sweeps in 200 ways (COUNT for another number) and resume them: docs/reliability.md (about 1 h; goes on where it was stopped)
+	$(BIN)/python tests/faults/campaign.py --count $(or $(COUNT),200) --seed $(SEED) --rows results/faults.csv --page docs/reliability.md
+	install -m 644 results/faults.csv docs/data/
+
 reference: setup ## remake the reference ensembles of docs/data (about 2 h on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) reference
 	install -m 644 results/benchmark/reference_replicates.csv docs/data/
@@ -110,15 +117,14 @@ synthetic: setup ## remake the synthetic filtration tests of config/measurements
 	$(BIN)/python tests/data/make_measurements.py results/synthetic_truth/summary.csv
 
 fuzz: setup ## spoilt inputs of every kind to the code that reads them: docs/data/fuzz.csv (COUNT=10000 SEED=1)
-	$(BIN)/python tests/fuzz/campaign.py --count $(COUNT) --seed $(SEED) --processes $(CORES) --output docs/data/fuzz.csv
+	$(BIN)/python tests/fuzz/campaign.py --count $(or $(COUNT),10000) --seed $(SEED) --processes $(CORES) --output docs/data/fuzz.csv
 
 references: setup ## remake the stored LIGGGHTS trajectories that the tests compare the embedded engine with
 	$(BIN)/python tests/data/force_scenes.py
 	$(BIN)/python tests/data/make_liggghts_data.py
 
-resume: setup ## go on after a kill or a crash; finished packings are kept
-	$(BIN)/snakemake --unlock $(CONFIG) >/dev/null 2>&1 || true
-	$(SNAKEMAKE) $(CONFIG) --rerun-incomplete
+resume: setup ## go on after a kill, a crash or damage, with the same STUDIES or CALIBRATION; finished packings are kept
+	$(BIN)/python -m filtercake.resume $(PLACE) $(RESUMED)
 
 retry: setup ## make the packings that failed once more
 	$(BIN)/python -m filtercake.retry results

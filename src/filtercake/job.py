@@ -9,26 +9,31 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
+from filtercake import checksums
 from filtercake.errors import FiltercakeError
 
 FAILURE = "FAILED: "
 """Starts the log line that says why a job failed."""
 PROGRESS_VARIABLE = "FILTERCAKE_PROGRESS"
+FOLDER_VARIABLE = "FILTERCAKE_FOLDER"
+"""Working directory of the run that started a process: tells what a killed run left."""
 
 
 @contextmanager
-def job(log: str | Path) -> Iterator[logging.Logger]:
+def job(log: str | Path, outputs: Iterable[str | Path] = ()) -> Iterator[logging.Logger]:
     """Run a job's body: log to a file, turn SIGTERM into an orderly end, and say a failure's reason in one line.
 
     Parameters
     ----------
     log : str or Path
         The job's log file.
+    outputs : iterable of str or Path
+        What the job makes; their checksums are kept beside the log.
 
     Yields
     ------
@@ -45,6 +50,7 @@ def job(log: str | Path) -> Iterator[logging.Logger]:
     previous = signal.signal(signal.SIGTERM, _end)
     try:
         yield logger
+        checksums.write(path.with_suffix(checksums.SUFFIX), outputs)
     except FiltercakeError as error:
         logger.error("%s%s", FAILURE, "; ".join(str(error).splitlines()))
         print(f"filtercake: {error}", file=sys.stderr)

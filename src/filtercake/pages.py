@@ -130,6 +130,45 @@ def stability(template: Path, table: pd.DataFrame) -> str:
     )
 
 
+def reliability(template: Path, table: pd.DataFrame) -> str:
+    """Write the page on injected faults.
+
+    Parameters
+    ----------
+    template : Path
+        The page's prose.
+    table : DataFrame
+        One row per fault: seed and round (the sweep it hit), family, kind, target, lost, accepted, left, commands,
+        equal.
+    """
+    groups = {str(name): group for name, group in table.groupby("family", sort=False)}
+    return _render(
+        template,
+        total=len(table),
+        whole=_outcome(table),
+        families=[{"family": name, "words": _words(group), **_outcome(group)} for name, group in groups.items()],
+        kinds=[
+            {"family": family, "kind": kind, "target": target, **_outcome(group)}
+            for (family, kind, target), group in table.groupby(["family", "kind", "target"])
+        ],
+    )
+
+
+def _outcome(rows: pd.DataFrame) -> dict[str, int]:
+    """Count faults and what became of them; a sweep's outcome is counted once for all faults that hit it."""
+    sweeps = rows.drop_duplicates(["seed", "round"])
+    return {
+        "faults": len(rows),
+        "sweeps": len(sweeps),
+        **{name: int(sweeps[name].sum()) for name in ("lost", "accepted", "left")},
+        "resumed": int((rows["equal"] & (rows["commands"] == 1)).sum()),
+    }
+
+
+def _words(rows: pd.DataFrame) -> str:
+    return ", ".join(str(kind).replace("_", " ") for kind in sorted(rows["kind"].unique()))
+
+
 def _render(template: Path, **values: Any) -> str:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(template.parent),

@@ -141,3 +141,27 @@ def test_figures_draw_every_case() -> None:
     )
     labels = [text.get_text() for text in plot.legends[0].get_texts()]
     assert {"default", "as published, count", "analytic models", "LIGGGHTS, default"} <= set(labels)
+
+
+def test_the_reliability_page_counts_a_sweep_once() -> None:
+    good = {"lost": 0, "accepted": 0, "left": 0, "commands": 1, "equal": True}
+    rows = [
+        {"seed": 1, "round": 0, "family": "signals", "kind": "SIGKILL", "target": "group", **good},
+        {"seed": 1, "round": 0, "family": "signals", "kind": "SIGINT", "target": "script", **good},
+        {"seed": 1, "round": 1, "family": "damage", "kind": "bit_flipped", "target": "csd", **good},
+    ]
+    page = pages.reliability(TEMPLATES / "reliability.md.j2", pd.DataFrame(rows))
+    assert "3 faults injected into 2 real small sweeps" in page
+    assert "byte for byte | 3 of 3 |" in page
+    assert "| a run was stopped or killed | SIGINT, SIGKILL | nothing | 2 | 1 | 0 | 0 | 0 | 2 |" in page
+    rows[0] |= {"lost": 2, "equal": False}
+    rows[1] |= {"lost": 2, "equal": False}
+    page = pages.reliability(TEMPLATES / "reliability.md.j2", pd.DataFrame(rows))
+    assert "made again though whole) | 2 |" in page
+    assert "byte for byte | 1 of 3 |" in page
+
+
+def test_the_committed_reliability_page_is_that_of_its_table() -> None:
+    docs = TEMPLATES.parents[1] / "docs"
+    page = pages.reliability(TEMPLATES / "reliability.md.j2", pd.read_csv(docs / "data" / "faults.csv"))
+    assert page == (docs / "reliability.md").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from filtercake.errors import PackingRejected
-from filtercake.packing.result import Packing, publish, read_record, sha256, write_json
+from filtercake.packing.result import Packing, publish, read_record, sealed, sha256, write_json
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_garbage_with_a_matching_checksum_is_still_refused(packing: Packing, tmp
     npz = tmp_path / "r0.npz"
     packing.save(npz)
     npz.write_bytes(content)
-    write_json(tmp_path / "r0.json", {"sha256": sha256(npz)})
+    write_json(tmp_path / "r0.json", sealed({"sha256": sha256(npz)}))
     with pytest.raises(PackingRejected, match=r"r0\.npz cannot be read"):
         Packing.load(npz)
 
@@ -101,7 +101,7 @@ def test_garbage_with_a_matching_checksum_is_still_refused(packing: Packing, tmp
 def test_an_archive_without_radii_is_refused(tmp_path: Path) -> None:
     npz = tmp_path / "r0.npz"
     np.savez(npz, position=np.zeros((1, 3)))
-    write_json(tmp_path / "r0.json", {"sha256": sha256(npz)})
+    write_json(tmp_path / "r0.json", sealed({"sha256": sha256(npz)}))
     with pytest.raises(PackingRejected, match="cannot be read"):
         Packing.load(npz)
 

@@ -26,8 +26,10 @@ class Checkout:
     def results(self) -> Path:
         return self.root / "results" / "tiny"
 
-    def snakemake(self, *arguments: str, timeout: float = 300, **environment: str) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
+    def snakemake(
+        self, *arguments: str, module: str = "snakemake", timeout: float = 300, **environment: str
+    ) -> subprocess.CompletedProcess:
+        command = [sys.executable, "-m", module, "--cores", "2", *arguments]
         return subprocess.run(
             command,
             cwd=self.root,
@@ -39,6 +41,10 @@ class Checkout:
 
     def run(self, *arguments: str, study: str = TINY, **environment: str) -> subprocess.CompletedProcess:
         return self.snakemake("--config", f"studies={study}", *arguments, **environment)
+
+    def resume(self, *arguments: str, study: str = TINY) -> subprocess.CompletedProcess:
+        """What ``make resume`` does."""
+        return self.snakemake("--config", f"studies={study}", *arguments, module="filtercake.resume")
 
     def planned(self, study: str = TINY) -> Counter:
         """Jobs that a run would start, by rule."""

@@ -11,7 +11,7 @@ from filtercake.calibration_config import (
 )
 from filtercake.config_loading import find_studies, load_studies
 from filtercake.figures import calibrated, catalogue
-from filtercake.job import PROGRESS_VARIABLE, Progress
+from filtercake.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
 from filtercake.packing.result import read_record
@@ -62,6 +62,7 @@ KNOWN = dict(STUDIES)
 KNOWN_POINTS = dict(POINTS)
 RESULTS = settings.results
 STARTED = time.time()
+os.environ[FOLDER_VARIABLE] = str(Path.cwd().resolve())
 os.environ[PROGRESS_VARIABLE] = str(Path(RESULTS, ".progress").resolve())
 
 
@@ -212,7 +213,12 @@ def cores_of_run():
 def begin_run():
     to_make = points_to_make()
     packings = sum(point.replicates for group in to_make.values() for point in group)
-    Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), packings)
+    try:
+        Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), packings)
+    except OSError as error:
+        raise WorkflowError(
+            f"the results folder {RESULTS} cannot be written: {error.strerror}"
+        )
     for name in points_of_run():
         for warning in KNOWN[name].warnings:
             print(f"warning: {warning}", file=sys.stderr)

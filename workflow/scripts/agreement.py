@@ -11,7 +11,7 @@ from filtercake.packing.result import publish
 COLUMNS = ["study", "csd", "cohesion_kJ_m3", "friction", "engine", "replicate", "seed", "status", "reason"]
 COLUMNS += ["porosity", "porosity_as_published", "overlap_max", "coordination", "steps"]
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     replicates = pd.concat([pd.read_csv(path) for path in snakemake.input.replicates], ignore_index=True)
     table = compare_engines(replicates, *snakemake.params.engines)
     log.info("\n%s", table.to_string())

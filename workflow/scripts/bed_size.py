@@ -8,7 +8,7 @@ from filtercake.agreement import compare_sizes
 from filtercake.job import job
 from filtercake.packing.result import publish
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     table = compare_sizes(*(pd.read_csv(path) for path in snakemake.input.replicates))
     log.info("\n%s", table.to_string())
     with publish(Path(snakemake.output[0])) as temporary:

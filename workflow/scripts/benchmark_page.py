@@ -12,7 +12,7 @@ from filtercake.figures.style import applied
 from filtercake.job import job
 from filtercake.packing.result import publish
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     table = pd.concat([pd.read_csv(file) for file in snakemake.input.errors], ignore_index=True)
     table["on_front"] = table.groupby(["case", "estimator"], group_keys=False)[["axis", "n", "seconds", "error"]].apply(
         on_front

@@ -7,7 +7,7 @@ from filtercake.calibration_study import Task, conclude, prediction_points
 from filtercake.job import job
 from filtercake.packing.result import publish, read_record, write_json
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     task = Task.from_params(snakemake.params.calibration)
     rounds = [read_record(Path(file)) for file in snakemake.input.rounds]
     visited = [name for made in rounds for name in made["points"]]

@@ -12,7 +12,7 @@ from filtercake.packing.result import read_record
 
 NAMES = {"csd": str, "point": str}
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     tables = {Path(table).stem: pd.read_csv(table, dtype=NAMES) for table in snakemake.input.tables}
     predictions = [pd.read_csv(table, dtype=NAMES) for table in snakemake.input.predictions]
     data = CalibrationData(

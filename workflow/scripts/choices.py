@@ -9,7 +9,7 @@ from filtercake.job import Progress, job
 from filtercake.packing.result import publish
 from filtercake.study import base_point
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     study = load_study(Path(snakemake.params.study))
     wide = load_study(Path(snakemake.params.wide)).csds[snakemake.params.wide_csd]
     name = snakemake.params.csd

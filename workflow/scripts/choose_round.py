@@ -6,7 +6,7 @@ from filtercake.calibration_study import Task, choose_round
 from filtercake.job import job
 from filtercake.packing.result import read_record, write_json
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     task = Task.from_params(snakemake.params.calibration)
     visited = [name for file in snakemake.input.rounds for name in read_record(Path(file))["points"]]
     simulated = task.simulate(visited, Path(snakemake.params.packings), snakemake.input.csds) if visited else None

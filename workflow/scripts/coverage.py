@@ -10,7 +10,7 @@ from filtercake.job import Progress, job
 from filtercake.packing.result import publish
 from filtercake.study import base_point
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case
     study = load_study(Path(case["study"]))
     table = coverage(

@@ -11,7 +11,7 @@ from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.tables import crystallizer_table
 
-with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
+with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     study = Study.model_validate(snakemake.params.study)
     states = {name: SteadyState(**values) for name, values in snakemake.params.states.items()}
     csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds}

@@ -19,7 +19,7 @@ def distribution(file, source):
     return mixture([size * MICROMETRE for size, _ in classes], [fraction for _, fraction in classes])
 
 
-with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
+with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     full = distribution(list(snakemake.input.file), snakemake.params.source)
     table = to_table(full, truncate(full, **snakemake.params.source["truncation"]).csd)
     table.to_csv(temporary, index=False)

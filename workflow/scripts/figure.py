@@ -9,7 +9,7 @@ from filtercake.csd import from_table
 from filtercake.figures.catalogue import StudyData, draw, save
 from filtercake.job import job
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     data = StudyData(
         name=snakemake.wildcards.study,
         study=Study.model_validate(snakemake.params.study),

@@ -10,7 +10,7 @@ from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.tables import filter_design
 
-with job(snakemake.log[0]) as log, publish(Path(snakemake.output[0])) as temporary:
+with job(snakemake.log[0], snakemake.output) as log, publish(Path(snakemake.output[0])) as temporary:
     study = Study.model_validate(snakemake.params.study)
     csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds}
     table = filter_design(study, csds, pd.read_csv(snakemake.input.summary))

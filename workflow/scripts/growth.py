@@ -12,7 +12,7 @@ from filtercake.job import Progress, job
 from filtercake.packing.result import publish
 from filtercake.study import base_point
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     study = load_study(Path(snakemake.params.study))
     spec = base_point(study, snakemake.params.csd, engine_choice.choose).spec
     table = time_growth(

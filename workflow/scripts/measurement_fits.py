@@ -6,7 +6,7 @@ from filtercake.job import job
 from filtercake.measurements import compressibility_table, fits_table, load_measurements
 from filtercake.packing.result import publish
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     measurements = load_measurements(Path(snakemake.input.files[0]))
     for warning in measurements.warnings:
         log.info("%s", warning)

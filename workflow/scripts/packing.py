@@ -37,7 +37,7 @@ def main(table, sources, spec, asked, manifest, point, logger):
         note(f"interval {enough.half_width:.2g} after {len(enough.values)} packings, {asked.interval:g} asked for")
 
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     main(
         snakemake.input.csd,
         [*snakemake.input.library, *snakemake.input.templates],

@@ -20,7 +20,7 @@ def main(task, packings, tables, rounds, summary, study):
     return prediction_table(outcome, task.settings, near, task.full_csds(tables), drum, flow)
 
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     table = main(
         Task.from_params(snakemake.params.calibration),
         Path(snakemake.params.packings),

@@ -8,7 +8,7 @@ from filtercake.job import job
 from filtercake.packing.result import write_json
 from filtercake.provenance import describe
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     replicates = pd.read_csv(snakemake.input.replicates)
     write_json(
         Path(snakemake.output[0]),

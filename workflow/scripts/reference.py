@@ -8,6 +8,6 @@ from filtercake.accuracy import REFERENCE_COLUMNS
 from filtercake.job import job
 from filtercake.packing.result import publish
 
-with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
+with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     tables = [pd.read_csv(file)[list(REFERENCE_COLUMNS)] for file in snakemake.input.replicates]
     pd.concat(tables, ignore_index=True).to_csv(temporary, index=False)

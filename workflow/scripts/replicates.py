@@ -18,7 +18,7 @@ def main(points, packings, csd_tables, sphericity, output):
         table.to_csv(temporary, index=False)
 
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     main(
         [Point.from_dict(values) for values in snakemake.params.points],
         Path(snakemake.output[0]).parent / "packings",

@@ -12,7 +12,7 @@ from filtercake.job import Progress, job
 from filtercake.packing.result import publish
 from filtercake.study import base_point
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     case, name = snakemake.params.case, snakemake.wildcards.case
     study = load_study(Path(case["study"]))
     spec = base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).spec

@@ -11,7 +11,7 @@ from filtercake.packing.result import publish
 from filtercake.study import base_point
 from filtercake.units import MICROMETRE, MICROSECOND
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case
     study = load_study(Path(case["study"]))
     spec = base_point(study, case["csd"], engine_choice.choose).spec

@@ -7,7 +7,7 @@ from filtercake.packing.engines import ENGINES
 from filtercake.packing.result import publish
 from filtercake.stability import cases, run
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     runnable = [name for name, engine in ENGINES.items() if engine().why_missing() is None]
     quick = snakemake.params.quick
     table = run(

@@ -12,7 +12,7 @@ from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.stability import with_fence
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     table = with_fence(pd.concat([pd.read_csv(file) for file in snakemake.input.tables], ignore_index=True))
     with publish(Path(snakemake.output.table)) as temporary:
         table.to_csv(temporary, index=False)

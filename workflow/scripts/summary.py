@@ -8,5 +8,5 @@ from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.study import summarise
 
-with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
+with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     summarise(pd.read_csv(snakemake.input.replicates)).to_csv(temporary, index=False)

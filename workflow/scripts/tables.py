@@ -10,7 +10,7 @@ from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.tables import comparison, table1, table2, table4
 
-with job(snakemake.log[0]):
+with job(snakemake.log[0], snakemake.output):
     study = Study.model_validate(snakemake.params.study)
     csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds}
     for output, table in (

@@ -8,7 +8,7 @@ from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.twin import repeat_calibrations, summarise
 
-with job(snakemake.log[0]) as log:
+with job(snakemake.log[0], snakemake.output) as log:
     pool, truth = (
         pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
         for files in (snakemake.input.pool, snakemake.input.truth)

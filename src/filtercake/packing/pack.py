@@ -13,13 +13,15 @@ from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRej
 from filtercake.packing.accept import accept
 from filtercake.packing.cloud import Cloud, make_cloud
 from filtercake.packing.engines import Engine, SettleRequest, get_engine
-from filtercake.packing.result import Packing, SettledState, read_record, sha256, write_json
+from filtercake.packing.result import Packing, SettledState, read_sealed, sealed, sha256, write_json
 from filtercake.packing.settling import StopRule
 from filtercake.packing.spec import PackingSpec, digest, stage_seed
 
 ATTEMPTS = 3
 """Times a packing is tried when it fails for a reason that may pass (killed, output cut short)."""
 MANIFEST = "replicates.json"
+WORK = ".work"
+"""Scratch folder of a point's packings."""
 
 Report = Callable[[str], None]
 
@@ -42,6 +44,9 @@ class Outcome:
         Checksum of the geometry file; empty where there is none.
     attempts : int
         How often it was tried.
+    may_pass : bool
+        Whether it failed for a reason outside the packing (program killed or missing, disk full, time limit), so that
+        another run may make it.
     """
 
     replicate: int
@@ -50,6 +55,7 @@ class Outcome:
     seed: int
     sha256: str
     attempts: int
+    may_pass: bool = False
 
 
 def cloud_seed(spec: PackingSpec, csd: CrystalSizeDistribution, replicate: int) -> int:
@@ -193,7 +199,7 @@ def pack_replicates(
     """
     key = digest(code, spec.as_dict(), csd.size.tolist(), csd.volume_fraction.tolist())
     engine = get_engine(spec.engine)
-    work = folder / ".work"
+    work = folder / WORK
     shutil.rmtree(work, ignore_errors=True)
     outcomes = []
     for replicate in range(replicates):
@@ -206,20 +212,40 @@ def pack_replicates(
         if outcome.status == "ok" and enough(npz):
             break
     shutil.rmtree(work, ignore_errors=True)
-    write_json(folder / MANIFEST, {"key": key, "replicates": [vars(outcome) for outcome in outcomes]})
+    write_json(folder / MANIFEST, sealed({"key": key, "replicates": [vars(outcome) for outcome in outcomes]}))
     return outcomes
 
 
 def finished(npz: Path, key: str, replicate: int) -> tuple[Outcome, dict[str, Any]] | None:
     """Outcome and record of a replicate that was made before from the same inputs and is still whole."""
     try:
-        record = read_record(npz.with_suffix(".json"))
+        record = read_sealed(npz.with_suffix(".json"))
         if record.get("key") != key or record.get("sha256") != sha256(npz):
             return None
     except (PackingRejected, OSError):
         return None
     outcome = Outcome(replicate, "ok", "", record["seed"], record["sha256"], record["attempts"])
     return outcome, record
+
+
+def whole(manifest: Path) -> bool:
+    """Whether a manifest and every packing that it lists as accepted are what was written."""
+    try:
+        for entry in read_sealed(manifest)["replicates"]:
+            npz = manifest.parent / f"r{entry['replicate']}.npz"
+            if entry["status"] == "ok" and (
+                read_sealed(npz.with_suffix(".json")).get("sha256") != entry["sha256"] or sha256(npz) != entry["sha256"]
+            ):
+                return False
+    except (PackingRejected, OSError):
+        return False
+    return True
+
+
+def _may_pass(error: Exception) -> bool:
+    """Whether the program failed, not the packing."""
+    refused = isinstance(error, EngineError) and error.outcome == "refused"
+    return refused or bool(getattr(error, "transient", False))
 
 
 def _attempt(
@@ -248,7 +274,7 @@ def _attempt(
                 continue
             _keep_evidence(scratch, npz)
             state_file.unlink(missing_ok=True)
-            return Outcome(replicate, "failed", str(error), seed, "", attempt), {}
+            return Outcome(replicate, "failed", str(error), seed, "", attempt, _may_pass(error)), {}
         record = {**made.diagnostics, "key": key, "attempts": attempt}
         checksum = Packing(made.position, made.radius, made.length, record).save(npz)
         _keep_pictures(scratch, npz)

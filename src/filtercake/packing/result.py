@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import tempfile
 import zipfile
 from collections.abc import Iterator
@@ -17,7 +18,13 @@ import numpy as np
 
 from filtercake.errors import PackingRejected
 from filtercake.packing.settling import Trajectory
+from filtercake.packing.spec import digest
 from filtercake.units import FloatArray
+
+TEMPORARY = re.compile(r"\..+\.[a-z0-9_]{8}")
+"""Matches the names that :func:`publish` writes to."""
+SEAL = "seal"
+"""Key of a record's checksum over its other entries."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,7 @@ class Packing:
             with temporary.open("wb") as stream:
                 np.savez(stream, position=self.position, radius=self.radius, length=np.float64(self.length))
             checksum = sha256(temporary)
-        write_json(npz.with_suffix(".json"), {**self.diagnostics, "sha256": checksum})
+        write_json(npz.with_suffix(".json"), sealed({**self.diagnostics, "sha256": checksum}))
         return checksum
 
     @classmethod
@@ -104,7 +111,7 @@ class Packing:
         PackingRejected
             If a file is missing, damaged, or not the one that was accepted.
         """
-        record = read_record(npz.with_suffix(".json"))
+        record = read_sealed(npz.with_suffix(".json"))
         try:
             if sha256(npz) != record.get("sha256"):
                 raise PackingRejected([f"{npz.name} is not the file that was accepted (checksum differs)"])
@@ -128,6 +135,26 @@ def read_record(path: Path) -> dict[str, Any]:
         raise PackingRejected([f"{path.name} cannot be read: {error}"]) from None
     if not isinstance(record, dict):
         raise PackingRejected([f"{path.name} does not hold a packing's record"])
+    return record
+
+
+def sealed(record: dict[str, Any]) -> dict[str, Any]:
+    """Add the checksum of a record's entries to it."""
+    return {**record, SEAL: digest(record)}
+
+
+def read_sealed(path: Path) -> dict[str, Any]:
+    """Read a record that carries its own checksum, which is left out.
+
+    Raises
+    ------
+    PackingRejected
+        If the file is missing, or is not what was written.
+    """
+    record = read_record(path)
+    seal = record.pop(SEAL, None)
+    if seal != digest(record):
+        raise PackingRejected([f"{path.name} is not the record that was written (checksum differs)"])
     return record
 
 

@@ -54,6 +54,8 @@ def run(
     """
     # ranks that wait must yield: two of them on one core would otherwise hardly advance
     environment = {"OMPI_MCA_mpi_yield_when_idle": "1", **os.environ, "OMP_NUM_THREADS": "1"}
+    # a program that is killed leaves its temporary files: here they go with the folder
+    environment["TMPDIR"] = str(folder.resolve())
     with output.open("wb") as stream:
         try:
             process = subprocess.Popen(
