@@ -15,7 +15,6 @@ from filtercake import contact
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROSECOND
 
 PAGE: Final = "docs/stability.md"
-ERROR_PAGE: Final = "docs/benchmark.md"
 
 FRICTIONLESS_TIME_STEP: Final = 0.5
 """Default time step over the Rayleigh step at mu = 0."""
@@ -34,7 +33,9 @@ LIGGGHTS_RESTITUTION: Final = 0.05
 LARGE_RESTITUTION: Final = 0.95
 """Restitution above which beds hardly come to rest: warned."""
 FRICTIONAL_LIMIT: Final = 0.36
-"""Time step over the Rayleigh step above which frictional beds never come to rest: warned (acceptance refuses them)."""
+"""Time step over the Rayleigh step above which frictional beds never come to rest: refused."""
+SOFT_TIME_STEP: Final = 0.5
+"""The same for contacts that overlap by more than is beyond doubt."""
 LARGEST_RELATIVE_OVERLAP: Final = 0.035
 """Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
 DOUBTFUL_RELATIVE_OVERLAP: Final = 0.01
@@ -123,17 +124,36 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
             f"must be at least {SMALLEST_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us: "
             "shorter ones change nothing but the run time",
         )
-    elif scene.restitution < SMALL_RESTITUTION and scene.time_step > (DAMPED_TIME_STEP + 1e-9) * scene.rayleigh:
-        yield Finding(
-            "time_step",
-            f"must be at most {DAMPED_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} "
-            f"us where the restitution is under {SMALL_RESTITUTION:g}: above it, porosities are wrong by 0.01 and look "
-            f"right ({PAGE})",
-        )
+    else:
+        yield from _long_steps(scene)
     if scene.engine.startswith("liggghts") and scene.restitution <= LIGGGHTS_RESTITUTION:
         yield Finding(
             "restitution", f"LIGGGHTS takes only more than {LIGGGHTS_RESTITUTION:g}; use engine: embedded ({PAGE})"
         )
+
+
+def _long_steps(scene: Numbers) -> Iterator[Finding]:
+    """Say which time steps under the Rayleigh step are still too long for a scene."""
+    limits = (
+        (
+            scene.restitution < SMALL_RESTITUTION,
+            DAMPED_TIME_STEP,
+            f"at a restitution under {SMALL_RESTITUTION:g}: above it, porosities look right but are off by 0.01",
+        ),
+        (
+            scene.overlap > DOUBTFUL_RELATIVE_OVERLAP,
+            SOFT_TIME_STEP,
+            f"where contacts overlap by {scene.overlap:.1%} of the diameter: above it, beds do not come to rest",
+        ),
+        (scene.friction > 0.0, FRICTIONAL_LIMIT, "with friction: above it, beds do not come to rest"),
+    )
+    for holds, limit, why in limits:
+        if holds and scene.time_step > (limit + 1e-9) * scene.rayleigh:
+            yield Finding(
+                "time_step",
+                f"must be at most {limit:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us {why} "
+                f"({PAGE})",
+            )
 
 
 def doubts(scene: Numbers) -> Iterator[Finding]:
@@ -147,12 +167,6 @@ def doubts(scene: Numbers) -> Iterator[Finding]:
     if scene.restitution > LARGE_RESTITUTION:
         yield Finding(
             "restitution", f"over {LARGE_RESTITUTION:g} beds hardly come to rest; raise packing.max_fall_times ({PAGE})"
-        )
-    if scene.friction > 0.0 and scene.time_step > (FRICTIONAL_LIMIT + 1e-9) * scene.rayleigh:
-        yield Finding(
-            "time_step",
-            f"over {FRICTIONAL_LIMIT:g} of the Rayleigh time step frictional beds never come to rest, and are not "
-            f"accepted; leave it out for {FRICTIONAL_TIME_STEP:g} ({ERROR_PAGE})",
         )
 
 

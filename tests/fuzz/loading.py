@@ -86,7 +86,7 @@ def load_config() -> None:
     load_run(**{str(key): value for key, value in values.items()})
 
 
-def _engine(_csd: Any, _particles: int) -> str:
+def _engine(*_: Any) -> str:
     return "embedded"
 
 

@@ -143,7 +143,7 @@ def test_friction_may_be_fitted(tmp_path: Path) -> None:
         ("rival_friction: [0.1]", "fit_friction: [0, 0.1, 0.3]", "fit_friction goes without friction"),
         ("low: 0, high: 80", "low: 80, high: 0", "low must be below high"),
         ("step: 10", "step: 60", "step must divide the range"),
-        ("tiny_measurements.yaml", "nowhere.yaml", "cannot be read"),
+        ("tiny_measurements.yaml", "nowhere.yaml", "no such file"),
         ("title:", "titel:", "did you mean title?"),
     ],
 )

@@ -181,9 +181,13 @@ def test_sizes_nearly_equal_pack_as_one(name: str) -> None:
 def test_yu_zou_standish_by_hand() -> None:
     # ratio 1/2, V0 = 2: f = 2^-3.3 + 1.4 * 2^-2.7 = 0.316982, g = 2^-2 + 0.2 * 2^-3.7 = 0.265389
     coarse_carries = 2.0 - 0.1 * 2.0 * 0.316982
-    assert yu_zou_standish(mixture([1.0, 2.0], [0.1, 0.9]), 0.5) == pytest.approx(1.0 - 1.0 / coarse_carries, abs=1e-6)
+    assert yu_zou_standish(mixture([UM, 2.0 * UM], [0.1, 0.9]), 0.5) == pytest.approx(
+        1.0 - 1.0 / coarse_carries, abs=1e-6
+    )
     fine_carries = 2.0 - 0.5 * 1.0 * 0.265389
-    assert yu_zou_standish(mixture([1.0, 2.0], [0.5, 0.5]), 0.5) == pytest.approx(1.0 - 1.0 / fine_carries, abs=1e-6)
+    assert yu_zou_standish(mixture([UM, 2.0 * UM], [0.5, 0.5]), 0.5) == pytest.approx(
+        1.0 - 1.0 / fine_carries, abs=1e-6
+    )
 
 
 def test_rods_of_farr_groot_by_hand() -> None:

@@ -83,7 +83,7 @@ def test_packing_depends_on_its_engines_and_not_on_studies_and_figures() -> None
 def test_lower_floors_import_nothing_from_above() -> None:
     assert names("units") == {"__init__.py", "units.py"}
     assert names("errors") == {"__init__.py", "errors.py"}
-    assert names("resistance") == {"__init__.py", "csd.py", "errors.py", "resistance.py", "units.py"}
+    assert names("resistance") == {"__init__.py", "csd.py", "errors.py", "resistance.py", "units.py", "user_files.py"}
 
 
 @pytest.mark.parametrize("module", ["packing.pack", "csd", "porosity", "study"])
