@@ -180,7 +180,7 @@ def test_the_commands_of_the_page(here: OnCluster) -> None:
     cut = re.sub(r"\[0(\.\d)?,.*\]", r"[0\1]", study).replace("replicates: 8", "replicates: 2\n  particles: 400")
     (here.root / "config" / "studies" / "sweep.yaml").write_text(cut)
     blocks = re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL)
-    done = here.shell("".join(blocks))
+    done = here.shell("".join([*blocks, "squeue --me\n"]))
     assert done.returncode == 0, done.stdout + done.stderr
     assert len(pd.read_csv(here.root / "results" / "sweep" / "summary.csv")) == 1
     assert set(here.jobs().values()) == {"COMPLETED"}
