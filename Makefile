@@ -117,7 +117,7 @@ synthetic: setup ## remake the synthetic filtration tests of config/measurements
 	$(BIN)/python tests/data/make_measurements.py results/synthetic_truth/summary.csv
 
 fuzz: setup ## spoilt inputs of every kind to the code that reads them: docs/data/fuzz.csv (COUNT=10000 SEED=1)
-	$(BIN)/python tests/fuzz/campaign.py --count $(or $(COUNT),10000) --seed $(SEED) --processes $(CORES) --output docs/data/fuzz.csv
+	$(BIN)/python tests/fuzz/fuzzing.py --count $(or $(COUNT),10000) --seed $(SEED) --processes $(CORES) --output docs/data/fuzz.csv
 
 references: setup ## remake the stored LIGGGHTS trajectories that the tests compare the embedded engine with
 	$(BIN)/python tests/data/force_scenes.py

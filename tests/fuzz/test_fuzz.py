@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import campaign
+import fuzzing
 import pytest
 import watch as watching
 
@@ -20,14 +20,14 @@ INPUTS = 40
 
 
 @pytest.fixture(scope="module")
-def fuzz(tmp_path_factory: pytest.TempPathFactory) -> Iterator[campaign.Campaign]:
+def fuzz(tmp_path_factory: pytest.TempPathFactory) -> Iterator[fuzzing.Campaign]:
     before = Path.cwd()
-    yield campaign.Campaign(tmp_path_factory.mktemp("fuzz") / "scratch", seed=2024)
+    yield fuzzing.Campaign(tmp_path_factory.mktemp("fuzz") / "scratch", seed=2024)
     os.chdir(before)
 
 
-@pytest.mark.parametrize("kind", campaign.KINDS)
-def test_every_input_is_loaded_or_refused(fuzz: campaign.Campaign, kind: str) -> None:
+@pytest.mark.parametrize("kind", fuzzing.KINDS)
+def test_every_input_is_loaded_or_refused(fuzz: fuzzing.Campaign, kind: str) -> None:
     counts: Counter[str] = Counter()
     for number in range(INPUTS):
         outcome, said = fuzz.run(kind, fuzz.make(kind, number))

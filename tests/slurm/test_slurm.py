@@ -27,7 +27,7 @@ def load(name: str, path: Path):
 
 
 slurm = load("filtercake_test_cluster", TESTS / "slurm" / "cluster.py")
-project = load("filtercake_test_project", TESTS / "workflow" / "conftest.py")
+project = load("filtercake_test_project", TESTS / "workflow" / "checkouts.py")
 
 pytestmark = pytest.mark.slurm
 

@@ -1,70 +1,7 @@
-"""Run the real workflow on a copy of the project, so that tests may edit any file of it."""
-
-import os
-import re
-import shutil
-import subprocess
-import sys
-from collections import Counter
-from dataclasses import dataclass
-from pathlib import Path
+"""Copies of the project for the tests of the workflow."""
 
 import pytest
-
-PROJECT = Path(__file__).resolve().parents[2]
-PARTS = ("Snakefile", "config", "workflow", "profiles", "liggghts_templates", "src", "docs")
-TINY = "config/test/tiny.yaml"
-
-
-@dataclass
-class Checkout:
-    """A copy of the project that runs its own library."""
-
-    root: Path
-
-    @property
-    def results(self) -> Path:
-        return self.root / "results" / "tiny"
-
-    def snakemake(
-        self, *arguments: str, module: str = "snakemake", timeout: float = 300, **environment: str
-    ) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", module, "--cores", "2", *arguments]
-        return subprocess.run(
-            command,
-            cwd=self.root,
-            env={**os.environ, "PYTHONPATH": str(self.root / "src"), **environment},
-            capture_output=True,
-            text=True,
-            timeout=timeout,
-        )
-
-    def run(self, *arguments: str, study: str = TINY, **environment: str) -> subprocess.CompletedProcess:
-        return self.snakemake("--config", f"studies={study}", *arguments, **environment)
-
-    def resume(self, *arguments: str, study: str = TINY) -> subprocess.CompletedProcess:
-        """What ``make resume`` does."""
-        return self.snakemake("--config", f"studies={study}", *arguments, module="filtercake.resume")
-
-    def planned(self, study: str = TINY) -> Counter:
-        """Jobs that a run would start, by rule."""
-        done = self.run("--dry-run", "--quiet", "host", study=study)
-        assert done.returncode == 0, done.stderr + done.stdout
-        text = done.stdout + done.stderr
-        table = re.search(r"^job +count\n-+ +-+\n(?P<rows>.*?)^total", text, re.MULTILINE | re.DOTALL)
-        rows = table["rows"].split("\n") if table else []
-        return Counter({name: int(count) for name, count in (row.split() for row in rows if row.strip())})
-
-
-def copy_project(target: Path) -> Checkout:
-    target.mkdir(parents=True, exist_ok=True)
-    for part in PARTS:
-        source = PROJECT / part
-        if source.is_dir():
-            shutil.copytree(source, target / part, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
-        else:
-            shutil.copy(source, target / part)
-    return Checkout(target)
+from checkouts import copy_project
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import Checkout, copy_project
+from checkouts import Checkout, copy_project
 
 from filtercake.calibration import Parameter
 from filtercake.calibration_config import load_calibration, settings_of

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import TINY, Checkout
+from checkouts import TINY, Checkout
 
 from filtercake.report.catalogue import PAGES
 
