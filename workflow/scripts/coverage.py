@@ -14,7 +14,7 @@ with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case
     study = load_study(Path(case["study"]))
     table = coverage(
-        base_point(study, case["csd"], lambda _csd, _particles: "embedded", friction=case["friction"]).spec,
+        base_point(study, case["csd"], lambda *_: "embedded", friction=case["friction"]).spec,
         study.csds[case["csd"]].truncated,
         reference_of(pd.read_csv(snakemake.input.reference), case["reference"], case["friction"]),
         snakemake.params.interval,
