@@ -28,6 +28,7 @@ with job(snakemake.log[0], snakemake.output):
         table,
         references,
         pd.read_csv(snakemake.input.choices),
+        pd.read_csv(snakemake.input.coverage),
         Path(snakemake.params.data),
     )
     with publish(Path(snakemake.output.page)) as temporary:
