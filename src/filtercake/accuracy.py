@@ -228,7 +228,7 @@ def _pmma_friction(make: _Maker) -> list[Variant]:
 
 
 def _alum(make: _Maker) -> list[Variant]:
-    listed = [make.default(12)]
+    listed = [make.default(48)]
     listed += make.time_steps({0.2: 4, 0.36: 8, 0.65: 8, 0.8: 8})
     # a few thousand spheres hold no large one when the countless small ones take part: less truncation needs millions
     listed += make.truncations({0.003: 8, 0.01: 8})
