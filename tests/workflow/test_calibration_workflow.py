@@ -127,7 +127,12 @@ def test_other_measurements_keep_the_packings(calibrated: Checkout) -> None:
         ("tiny.yaml", "predict: [from_file]", "predict: [other]", "predict[0] = 'other': not in the study"),
         ("tiny.yaml", "high: 80", "high: 500", "cohesion_kJ_m3.high = 500: must be at most"),
         ("tiny_measurements.yaml", "{csd: bimodal", "{csd: other", "not in the study; allowed: bimodal, from_file"),
-        ("tiny_measurements.yaml", "1.5e+9", "-1", "resistances[0].resistance_m_kg = -1: must be greater than or equal to 1"),
+        (
+            "tiny_measurements.yaml",
+            "1.5e+9",
+            "-1",
+            "resistances[0].resistance_m_kg = -1: must be greater than or equal to 1",
+        ),
         ("tiny_test.csv", "volume_mL", "volume", "tiny_test.csv"),
     ],
 )
