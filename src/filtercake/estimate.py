@@ -19,7 +19,7 @@ from filtercake.packing.engines.liggghts_as_published import STEPS
 from filtercake.packing.spec import PackingSpec
 from filtercake.precision import LEAST_REPLICATES
 from filtercake.study import Point
-from filtercake.units import HOUR, MINUTE
+from filtercake.units import HOUR, MINUTE, duration
 
 ACCURACY: Final = 1.5
 """Factor within which a packing's time holds on the machine of the benchmark, undisturbed."""
@@ -221,14 +221,6 @@ def together(estimates: Iterable[Estimate]) -> Estimate:
         points=sum(item.points for item in listed),
         packings=sum(item.packings for item in listed),
     )
-
-
-def duration(seconds: float) -> str:
-    """Write a time as a reader would say it."""
-    if seconds < 100.0:
-        return f"{seconds:.0f} s"
-    minutes = seconds / MINUTE
-    return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
 
 
 def _wide(csd: CrystalSizeDistribution) -> bool:

@@ -16,6 +16,7 @@ from types import FrameType
 
 from filtercake import checksums
 from filtercake.errors import FiltercakeError
+from filtercake.units import MINUTE, duration
 
 FAILURE = "FAILED: "
 """Starts the log line that says why a job failed."""
@@ -113,13 +114,7 @@ class Progress:
         pace = f"{done / minutes:.0f} per minute"
         if done > total:  # intervals and calibrations ask for packings as they go
             return f"[{done} packings, {pace}] "
-        return f"[{done}/{total} packings, {pace}, {_duration((total - done) * minutes / done)} left] "
-
-
-def _duration(minutes: float) -> str:
-    if minutes < 1.0:
-        return f"{60.0 * minutes:.0f} s"
-    return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
+        return f"[{done}/{total} packings, {pace}, {duration(MINUTE * (total - done) * minutes / done)} left] "
 
 
 def failure_reason(log: Path) -> str:

@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
-import yaml
 
 from filtercake import checksums
 from filtercake.config_loading import load_workflow
@@ -25,6 +24,7 @@ from filtercake.job import FOLDER_VARIABLE
 from filtercake.packing.pack import MANIFEST, WORK, whole
 from filtercake.packing.result import TEMPORARY
 from filtercake.retry import forget, forget_failures
+from filtercake.user_files import read_yaml
 
 GRACE_SECONDS = 15.0
 """Wall time that a process left over has to end by itself."""
@@ -165,8 +165,7 @@ def results_folder(arguments: list[str]) -> Path:
     for argument in arguments:
         if argument.startswith("results="):
             return Path(argument.removeprefix("results="))
-    values = yaml.safe_load(Path(CONFIG_FILE).read_text(encoding="utf-8"))
-    return Path(load_workflow(values, CONFIG_FILE).results)
+    return Path(load_workflow(read_yaml(Path(CONFIG_FILE)), CONFIG_FILE).results)
 
 
 def main(arguments: list[str]) -> None:

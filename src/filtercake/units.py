@@ -45,6 +45,14 @@ def tidy(value: float) -> float:
     return float(f"{value:.12g}")
 
 
+def duration(seconds: float) -> str:
+    """Write a time as a reader would say it."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    minutes = seconds / MINUTE
+    return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
+
+
 def split_header(header: str) -> tuple[str, str | None]:
     """Split a column header into its name and unit.
 

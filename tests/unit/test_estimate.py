@@ -21,7 +21,6 @@ from filtercake.estimate import (
     GROUP_SIZES,
     LONGEST_MINUTES,
     Estimate,
-    duration,
     estimate,
     fall_steps,
     group_size,
@@ -36,6 +35,7 @@ from filtercake.growth import even_distribution
 from filtercake.packing.engines.base import LARGE_BED
 from filtercake.packing.spec import PackingSpec
 from filtercake.study import Point, expand
+from filtercake.units import duration
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DATA = REPOSITORY / "docs" / "data"
