@@ -245,6 +245,14 @@ BROKEN: list[tuple[Any, ...]] = [
     ),
     pytest.param(
         "  - csd: bimodal",
+        "  - csd: bimodal\n    restitution: [0.3, 0.05]\npacking:\n  engine: liggghts",
+        "sweeps[0].restitution[1]",
+        "0.05",
+        "LIGGGHTS takes only more than 0.05; use engine: embedded",
+        id="restitution of LIGGGHTS",
+    ),
+    pytest.param(
+        "  - csd: bimodal",
         "  - csd: bimodal\n    restitution: [0.3, 1.0]",
         "sweeps[0].restitution[1]",
         "1.0",

@@ -155,7 +155,7 @@ def test_a_large_bed_takes_two_cores_for_half_the_time(
 def test_walltime_doubles_with_every_retry_and_has_an_end(
     point_of: Callable[..., tuple[Point, CrystalSizeDistribution]],
 ) -> None:
-    point, csd = point_of()
+    point, csd = point_of(replicates=1000)
     first = walltime_minutes(point, csd)
     assert 60 * first > 4.0 * point.replicates * packing_seconds(point.spec, csd)
     assert walltime_minutes(point, csd, 2) in (2 * first, 2 * first - 1)

@@ -130,6 +130,13 @@ def test_sideways_drift_is_that_of_the_centre_of_mass() -> None:
     assert momentum_drift(state([1.0, 1.0], [0.0, 0.0], velocity * [[1], [-1]])) == pytest.approx(0.0)
 
 
+def test_the_fence_knows_what_liggghts_does_not_take() -> None:
+    listed = [c for c in cases(ENGINES) if (c.family, c.scene.restitution, c.y) == ("restitution_time_step", 0.01, 0.5)]
+    table = pd.DataFrame([{"family": c.family, "engine": c.engine, "x": c.x, "y": c.y} for c in listed])
+    found = stability.with_fence(table)
+    assert dict(zip(found["engine"], found["fence"], strict=True)) == {"embedded": "allowed", "liggghts": "refused"}
+
+
 def test_undetected_is_wrong_accepted_and_unannounced() -> None:
     rows = [
         (0.010, 0.001, 3, "allowed"),

@@ -117,9 +117,9 @@ def test_auto_asks_for_an_engine(study_from) -> None:
         asked.append((csd.size.tolist(), particles, restitution))
         return "some_engine"
 
-    found = expand(study_from(SWEEPS + "  - {csd: [a, b]}\n"), choose)
-    assert [point.spec.engine for point in found] == ["some_engine"] * 2
-    assert [rest for _, *rest in asked] == [[500, 0.3], [500, 0.3]]
+    found = expand(study_from(SWEEPS + "  - {csd: [a, b], restitution: [0.3, 0.05]}\n"), choose)
+    assert [point.spec.engine for point in found] == ["some_engine"] * 4
+    assert [rest for _, *rest in asked] == [[500, 0.3], [500, 0.05]] * 2
     named = SWEEPS.replace("replicates: 3", "replicates: 3, engine: liggghts_as_published")
     assert expand(study_from(named + "  - {csd: a}\n"), choose)[0].spec.engine == "liggghts_as_published"
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from checkouts import Checkout
 
@@ -31,6 +33,35 @@ def test_a_benchmark_is_planned(target: str, jobs: list[str], tmp_path: Path) ->
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     assert all(job in done.stdout + done.stderr for job in jobs)
+
+
+def test_pages_are_made_of_the_committed_tables_again(checkout: Checkout) -> None:
+    data, folder = checkout.root / "docs" / "data", checkout.root / "results" / "benchmark"
+    for part, file, column, added in (
+        ("errors", "run_time_error.csv", "case", "on_front"),
+        ("stress", "stability.csv", "family", "fence"),
+    ):
+        (folder / part).mkdir(parents=True)
+        for name, rows in pd.read_csv(data / file).groupby(column):
+            rows.drop(columns=added).to_csv(folder / part / f"{name}.csv", index=False)
+    for name in ("choices.csv", "coverage.csv"):
+        shutil.copyfile(data / name, folder / name)
+    pages = {"benchmark.md": "run_time_error.csv", "stability.md": "stability.csv"}
+    # without Snakemake's own notes on them, only the dates of those tables count: nothing is packed
+    done = checkout.snakemake(*(f"results/benchmark/{page}" for page in pages), "--rerun-triggers", "mtime")
+    assert done.returncode == 0, done.stdout + done.stderr
+    for page, table in pages.items():
+        assert (folder / page).read_text() == (checkout.root / "docs" / page).read_text()
+        assert set(pd.read_csv(folder / table).columns) == set(pd.read_csv(data / table).columns)
+    assert {path.suffix for path in (folder / "images").iterdir()} == {".png", ".pdf"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["benchmark", "stability"])
+def test_quick_benchmarks_run_to_their_pages(target: str, checkout: Checkout) -> None:
+    done = checkout.snakemake(target, "--config", "quick=true", timeout=3600)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (checkout.root / "results" / "benchmark_quick" / f"{target}.md").stat().st_size > 3000
 
 
 def test_a_broken_study_of_bed_sizes_stops_only_their_comparison(checkout: Checkout) -> None:

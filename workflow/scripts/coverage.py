@@ -4,17 +4,19 @@ from pathlib import Path
 
 import pandas as pd
 
+from filtercake import engine_choice
 from filtercake.accuracy import coverage, reference_of
 from filtercake.config_loading import load_study
 from filtercake.job import Progress, job
+from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.result import publish
-from filtercake.study import base_point
+from filtercake.study import base_point, with_engine
 
 with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case
-    study = load_study(Path(case["study"]))
+    study = with_engine(load_study(Path(case["study"])), Embedded.name)
     table = coverage(
-        base_point(study, case["csd"], lambda *_: "embedded", friction=case["friction"]).spec,
+        base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).spec,
         study.csds[case["csd"]].truncated,
         reference_of(pd.read_csv(snakemake.input.reference), case["reference"], case["friction"]),
         snakemake.params.interval,
