@@ -33,7 +33,6 @@ rule figure:
         runtime=15,
     params:
         study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
-        packings=lambda wildcards: f"{RESULTS}/{wildcards.study}/packings",
     message:
         "{wildcards.figure} of {wildcards.study}"
     script:

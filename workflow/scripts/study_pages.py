@@ -2,10 +2,6 @@
 
 from pathlib import Path
 
-import pandas as pd
-
-from filtercake.config import Study
-from filtercake.csd import from_table
 from filtercake.figures.catalogue import StudyData
 from filtercake.job import job
 from filtercake.packing.result import read_record
@@ -13,15 +9,12 @@ from filtercake.report import captions, pages
 
 with job(snakemake.log[0]):
     folder = Path(snakemake.input.summary).parent
-    data = StudyData(
-        name=snakemake.wildcards.study,
-        study=Study.model_validate(snakemake.params.study),
-        points=pd.read_csv(snakemake.input.points),
-        summary=pd.read_csv(snakemake.input.summary),
-        replicates=pd.read_csv(snakemake.input.replicates),
-        csds={Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds},
-        packings=folder / "packings",
-        crystallizer=next(map(pd.read_csv, snakemake.input.crystallizer), pd.DataFrame()),
+    data = StudyData.read(
+        snakemake.wildcards.study,
+        snakemake.params.study,
+        folder,
+        snakemake.input.csds,
+        snakemake.input.crystallizer,
     )
     figures = [Path(figure) for figure in snakemake.input.figures]
     templates = Path(snakemake.input.front).parent

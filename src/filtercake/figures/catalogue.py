@@ -6,15 +6,15 @@ A new figure is one module with ``draw(data) -> Figure`` and one line in ``FIGUR
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from filtercake.config import Study
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.csd import CrystalSizeDistribution, from_table
 from filtercake.packing.result import publish
 from filtercake.study import Point
 
@@ -54,6 +54,36 @@ class StudyData:
     csds: dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
     packings: Path
     crystallizer: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    @classmethod
+    def read(
+        cls, name: str, study: Mapping[str, Any], folder: Path, csds: Iterable[str], crystallizer: Iterable[str]
+    ) -> StudyData:
+        """Read a study's tables.
+
+        Parameters
+        ----------
+        name : str
+            The study.
+        study : mapping
+            Its model's values.
+        folder : Path
+            Its results: points.csv, summary.csv, replicates.csv, packings.
+        csds : iterable of str
+            Tables of its distributions, named by them.
+        crystallizer : iterable of str
+            The crystallizer's table, if it has one.
+        """
+        return cls(
+            name=name,
+            study=Study.model_validate(study),
+            points=pd.read_csv(folder / "points.csv"),
+            summary=pd.read_csv(folder / "summary.csv"),
+            replicates=pd.read_csv(folder / "replicates.csv"),
+            csds={Path(table).stem: from_table(pd.read_csv(table)) for table in csds},
+            packings=folder / "packings",
+            crystallizer=next(map(pd.read_csv, crystallizer), pd.DataFrame()),
+        )
 
 
 def _always(_anything: object) -> bool:
