@@ -11,39 +11,40 @@ async function until(condition) {
     return Boolean(condition());
 }
 
-async function press(element) {
-    if (!element) throw new Error("nothing to press");
-    element.click();
+// waits for what `find` looks for: the page draws itself after it has loaded
+async function press(find, what) {
+    if (!(await until(find))) throw new Error(`nothing to press: ${what}`);
+    find().click();
     await pause(200);
 }
 
 const link = (text) => [...document.querySelectorAll("nav li a")].find((a) => a.innerText.trim() === text);
-const home = () => press(document.querySelector("nav ol a"));
+const home = () => press(() => document.querySelector("nav ol a"), "home");
 
 async function openRow(number) {
     const row = () => document.querySelectorAll("nav tbody tr")[number];
-    await press(row().querySelectorAll("td:last-child a")[0]);
+    await press(() => row()?.querySelectorAll("td:last-child a")[0], `row ${number}`);
     const image = document.querySelector("nav + div img"), frame = document.querySelector("nav + div iframe");
     const shown = image ? await until(() => image.naturalWidth > 0 && image.clientWidth > 100) : Boolean(frame && frame.clientWidth > 100);
     return { kind: image ? "img" : "html", shown };
 }
 
 async function caption(number) {
-    await press(document.querySelectorAll("nav tbody tr")[number].querySelectorAll("td:last-child a")[1]);
+    await press(() => document.querySelectorAll("nav tbody tr")[number]?.querySelectorAll("td:last-child a")[1], `caption ${number}`);
     const found = document.querySelector("nav .prose");
     return found ? found.innerText : "";
 }
 
 async function toPart(category, part) {
     await home();
-    await press(link(category));
-    if (Object.keys(categories[category]).length > 1) await press(link(part));
+    await press(() => link(category), category);
+    if (Object.keys(categories[category]).length > 1) await press(() => link(part), part);
 }
 
 async function walk() {
     const seen = { categories: {}, drawn: {} };
     for (const name of ["Statistics", "Workflow"]) {
-        await press(link(name));
+        await press(() => link(name), name);
         seen.drawn[name] = await until(() => document.querySelector("nav + div canvas, nav + div svg"));
     }
     for (const [category, parts] of Object.entries(categories)) {
