@@ -168,8 +168,8 @@ def job_seconds(point: Point, csd: CrystalSizeDistribution, start: float = START
 def walltime_minutes(point: Point, csd: CrystalSizeDistribution, attempt: int = 1) -> int:
     """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry."""
     most = point.most_replicates * packing_seconds(point.spec, csd) / parallelism(point.spec)
-    minutes = math.ldexp(START_MINUTES + WALLTIME_FACTOR * most / MINUTE, attempt - 1)
-    return min(LONGEST_MINUTES, math.ceil(minutes))
+    first = math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
+    return min(LONGEST_MINUTES, first << (attempt - 1))
 
 
 def memory_mb(spec: PackingSpec) -> int:
