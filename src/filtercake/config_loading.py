@@ -36,6 +36,12 @@ from filtercake.user_files import is_file, read_yaml
 MOST_PROBLEMS = 1000
 """Problems of a file that are looked into."""
 
+OWN_NAMES = ("benchmark", "benchmark_quick", "benchmarks", "logs", "pages")
+"""Folders of the results that are the workflow's own: no study can have such a name."""
+
+OWN_PREFIXES = ("agreement_", "calibration_")
+"""How the names begin of the studies that the workflow makes itself."""
+
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -107,7 +113,7 @@ def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
     Raises
     ------
     ConfigError
-        If a study does not exist, or two have the same name.
+        If a study does not exist, two have the same name, or one has a name of the workflow's own.
     """
     paths: list[Path] = []
     problems: list[Problem] = []
@@ -122,10 +128,23 @@ def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
             problems.append(Problem(file, key, repr(study), allowed + _did_you_mean(study, known)))
         elif path.stem in [other.stem for other in paths]:
             problems.append(Problem(file, key, repr(study), "two studies of the same name; rename one file"))
+        elif _is_own(path, folder.parent / "benchmarks"):
+            problems.append(Problem(file, key, repr(study), f"the workflow's own name ({_OWN}); rename the file"))
         paths.append(path)
     if problems:
         raise ConfigError(problems)
     return paths
+
+
+_OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
+
+
+def _is_own(path: Path, benchmarks: Path) -> bool:
+    """Whether a study's results would lie among those of the workflow's own; a benchmark itself may be asked for."""
+    twin = benchmarks / f"{path.stem}.yaml"
+    if twin.is_file():
+        return not twin.samefile(path)
+    return path.stem in OWN_NAMES or path.stem.startswith(OWN_PREFIXES)
 
 
 def load_study(path: Path) -> LoadedStudy:

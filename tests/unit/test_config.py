@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -596,6 +597,27 @@ def test_studies_that_are_not_there_are_named(write_study, tmp_path: Path, studi
     (problem,) = caught.value.problems
     assert problem.key == f"studies[{len(studies) - 1}]"
     assert says in problem.allowed
+
+
+@pytest.mark.parametrize("name", ["benchmark", "pages", "logs", "calibration_pmma", "agreement_x_embedded", "twin"])
+def test_a_study_cannot_have_a_name_of_the_workflows_own(write_study, tmp_path: Path, name: str) -> None:
+    benchmarks = tmp_path / "benchmarks"
+    benchmarks.mkdir()
+    shutil.copy(write_study(name="twin.yaml"), benchmarks / "twin.yaml")
+    study = write_study(name=f"{name}.yaml")
+    with pytest.raises(ConfigError) as caught:
+        find_studies(Workflow(studies=[str(study)]), tmp_path / "studies", "config.yaml")
+    (problem,) = caught.value.problems
+    assert (problem.key, problem.value) == ("studies[0]", repr(str(study)))
+    assert "the workflow's own name" in problem.allowed
+
+
+def test_a_benchmark_may_be_asked_for_by_its_path(write_study, tmp_path: Path) -> None:
+    (tmp_path / "benchmarks").mkdir()
+    for name in ("twin", "agreement_pmma"):
+        own = tmp_path / "benchmarks" / f"{name}.yaml"
+        write_study(name=own.name).rename(own)
+        assert find_studies(Workflow(studies=[str(own)]), tmp_path / "studies", "config.yaml") == [own]
 
 
 # --- a missing engine ----------------------------------------------------------------------------------------------
