@@ -150,3 +150,26 @@ def test_reports_say_how_many_are_down_and_when_it_ends(tmp_path: Path, monkeypa
     assert down == sorted(down)
     assert down[-1] == SPEC.particles
     assert all(line.endswith(" left") for line in lines)
+
+
+def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, monkeypatch):
+    clock = [0.0]
+    cloud = make_cloud(CSD, SPEC.particles, SPEC.void_fraction, 1)
+    spec = replace(SPEC, time_step=0.25e-6)
+    advance = embedded.Bed.advance
+    lines = []
+
+    def timed(bed, steps):
+        clock[0] += 1000.0 if clock[0] == 0.0 else 1.0  # the first steps compile
+        advance(bed, steps)
+
+    monkeypatch.setattr(embedded.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(embedded.Bed, "advance", timed)
+    monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.5)
+    run = embedded._Run(request(cloud, spec, tmp_path, lines.append), embedded.Bed.from_cloud(cloud, spec, 1))
+    run.settle()
+    took = clock[0] - 1000.0  # a second a check
+    forecasts = [re.search(r"about (\d+) (min|s) left", line).groups() for line in lines]
+    seconds = [int(number) * (60 if unit == "min" else 1) for number, unit in forecasts]
+    assert len(seconds) == len(run.records) - 2  # none before the pace is known
+    assert max(seconds) < 5.0 * took

@@ -72,7 +72,8 @@ class _Run:
         self.records = [bed.record()]
         self.started = self.reported = self.saved = time.monotonic()
         self.before = 0.0  # wall time spent before the bed was resumed, s
-        self.work = 0  # spheres in the bed times steps, in this run
+        self.work = 0  # spheres in the bed times steps since the pace is taken
+        self.paced: float | None = None  # since when: the first steps compile the engine and say nothing of the pace
 
     def settle(self) -> None:
         """Advance from check to check until the stop rule holds or its patience ends.
@@ -86,7 +87,10 @@ class _Run:
         while len(self.records) <= rule.max_checks and rule.settled_at(self.trajectory()) is None:
             self._picture()
             self.bed.advance(rule.check_steps)
-            self.work += self.bed.count * rule.check_steps
+            if self.paced is None:
+                self.paced = self.reported = time.monotonic()
+            else:
+                self.work += self.bed.count * rule.check_steps
             self.records.append(self.bed.record())
             if not all(map(math.isfinite, self.records[-1])):
                 raise EngineError(
@@ -156,5 +160,5 @@ class _Run:
         down: FloatArray = np.minimum(
             1.0, np.array([bed.fallen(int(step)) for step in steps]) / bed.fallen(int(arrival))
         )
-        pace = (time.monotonic() - self.started) / max(self.work, 1)
+        pace = (time.monotonic() - (self.paced or self.started)) / max(self.work, 1)
         return float(pace * bed.total * down.mean() * (steps[-1] - steps[0]))
