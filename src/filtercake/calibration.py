@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage, optimize, stats
+from scipy import ndimage, optimize, special
 
 from filtercake.errors import CalibrationError
 from filtercake.pooling import Pool, improbable, pool
@@ -295,7 +295,7 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
     chi_square, discrepancy = _misfit(residual, chosen, freedom)
     deviance = _deviance(residual, chosen, discrepancy).reshape(shape)
     deviance -= deviance.min()
-    threshold = float(stats.chi2.ppf(CONFIDENCE, 1))
+    threshold = float(special.chdtri(1, 1.0 - CONFIDENCE))
     estimates = tuple(
         _profile(parameter, axis, deviance, number, threshold)
         for number, (parameter, axis) in enumerate(zip(parameters, axes, strict=True))
@@ -552,10 +552,10 @@ def _compared(taken: float, own: Calibration, friction: float, rival: Calibratio
     variance = own.measured_variance + packed + discrepancy**2
     squares = {mu: float(np.sum(fit.residual**2 / variance)) for mu, fit in ((taken, own), (friction, rival))}
     (better, least), (worse, most) = sorted(squares.items(), key=lambda item: item[1])
-    needed = float(stats.chi2.ppf(CONFIDENCE, 1))
+    needed = float(special.chdtri(1, 1.0 - CONFIDENCE))
     if discrepancy > 0.0:
         freedom = own.degrees_of_freedom
-        needed = float(stats.f.ppf(CONFIDENCE, 1, freedom)) * least / freedom
+        needed = float(special.fdtri(1, freedom, CONFIDENCE)) * least / freedom
     numbers = (
         f"at equal errors chi-square {squares[friction]:.1f} with {friction:g} and {squares[taken]:.1f} with "
         f"{taken:g}; it takes a difference of {needed:.1f} to tell them apart"

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from filtercake.units import FloatArray
 
@@ -78,7 +78,7 @@ def scatter(values: ArrayLike, errors: ArrayLike) -> float:
 
 def improbable(chi_square: float, degrees_of_freedom: int) -> bool:
     """Whether errors alone would give so large a sum of squares only with the probability ``MISFIT`` or less."""
-    return degrees_of_freedom > 0 and bool(stats.chi2.sf(chi_square, degrees_of_freedom) < MISFIT)
+    return degrees_of_freedom > 0 and bool(special.chdtrc(degrees_of_freedom, chi_square) < MISFIT)
 
 
 def chi_square(values: ArrayLike, errors: ArrayLike) -> float:

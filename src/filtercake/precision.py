@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from filtercake.packing.result import Packing
 from filtercake.packing.spec import PackingSpec
@@ -32,7 +32,7 @@ def half_width(values: FloatArray, confidence: float = CONFIDENCE) -> float:
     n = values.size
     if n < 2:
         return float("nan")
-    quantile = float(stats.t.ppf(0.5 + confidence / 2.0, n - 1))
+    quantile = float(special.stdtrit(n - 1, 0.5 + confidence / 2.0))
     return quantile * float(np.std(values, ddof=1)) / float(np.sqrt(n))
 
 

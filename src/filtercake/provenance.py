@@ -113,17 +113,14 @@ def _file_of(module: str) -> Path | None:
     return package if package.is_file() else None
 
 
-def _imports(path: Path) -> list[Path]:
-    return [file for name in _imported(path) if (file := _file_of(name)) is not None]
-
-
 @cache
-def _imported(path: Path) -> tuple[str, ...]:
-    """Names below ``filtercake`` that a file imports; parsed once, since most modules stand behind many others."""
+def _imports(path: Path) -> tuple[Path, ...]:
+    """Files below ``ROOT`` that a file imports; parsed once, since most modules stand behind many others."""
     names: list[str] = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return tuple(name.removeprefix("filtercake.") for name in names if name.startswith("filtercake."))
+    own = [name.removeprefix("filtercake.") for name in names if name.startswith("filtercake.")]
+    return tuple(file for name in own if (file := _file_of(name)) is not None)

@@ -158,3 +158,12 @@ def test_packings_depend_on_their_own_engine_only(engine: str, own: set[str], ot
 def test_an_unknown_engine_has_no_files() -> None:
     with pytest.raises(FileNotFoundError, match="no engine 'magic'"):
         packing_sources("magic")
+
+
+def test_a_file_behind_many_modules_is_parsed_once(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed = []
+    parse = provenance.ast.parse
+    monkeypatch.setattr(provenance.ast, "parse", lambda text: parsed.append(text) or parse(text))
+    for module in ("top", "middle", "beside", "inner.ground"):
+        sources(module)
+    assert len(parsed) == 7  # every file once

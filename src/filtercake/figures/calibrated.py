@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy import special
 
 from filtercake.calibration import CONFIDENCE
 from filtercake.measurements import Measurements, compressibility_by_csd
@@ -23,7 +23,7 @@ from filtercake.precision import half_width
 if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
     from matplotlib.figure import Figure
 
-Z = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE))
+Z = float(special.ndtri(0.5 + 0.5 * CONFIDENCE))
 """Standard errors from an estimate to the end of its 95 % interval."""
 ESTIMATORS = {"interior": "interior porosity", "as_published": "porosity counted as in the paper"}
 """Names of estimators for readers; one that is not listed keeps its own."""

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
-from scipy import stats
+from scipy import special
 
 from filtercake.calibration import CONFIDENCE
 from filtercake.figures import calibrated, style
@@ -18,7 +18,7 @@ from filtercake.units import FloatArray
 if TYPE_CHECKING:
     from filtercake.figures.calibrated import CalibrationData
 
-THRESHOLD = float(stats.chi2.ppf(CONFIDENCE, 1))
+THRESHOLD = float(special.chdtri(1, 1.0 - CONFIDENCE))
 """Deviance up to which a value belongs to the 95 % interval of one parameter."""
 LEAST_HEIGHT, MOST_HEIGHT = 6.0, 20.0
 """Deviances at the top of the axes: the threshold is always seen, and so is the minimum."""
