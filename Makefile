@@ -86,7 +86,7 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 	$(if $(QUICK),,install -m 644 results/benchmark/images/stability_maps.png docs/images/)
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.csv docs/data/)
 
-faults: setup ## hurt small sweeps in 200 ways (COUNT for another number) and resume them: docs/reliability.md (about 1 h; goes on where it was stopped)
+faults: setup ## hurt small sweeps in 200 ways (COUNT for another number) and resume them: docs/reliability.md (about 20 min; goes on where it was stopped)
 	$(BIN)/python tests/faults/campaign.py --count $(or $(COUNT),200) --seed $(SEED) --rows results/faults.csv --page docs/reliability.md
 	install -m 644 results/faults.csv docs/data/
 

@@ -1,7 +1,7 @@
 """The fault campaign: hurt a real small sweep in every way there is, resume it by one command, and count what was lost.
 
 ``make faults`` runs it: ``python tests/faults/campaign.py --count 200 --seed 1``. One row per fault is added to a CSV
-as each sweep has been compared with an undisturbed one; families that stand in it already are not run again.
+as each sweep has been compared with an undisturbed one; what stands in it already is not run again.
 """
 
 from __future__ import annotations
@@ -440,17 +440,6 @@ def run_family(name: str, sweep: Sweep, count: int, rng: random.Random, minutes:
     return trial.faults
 
 
-def plan(count: int) -> list[tuple[str, str, int]]:
-    """Family, engine and number of faults of every sweep."""
-    rounds = []
-    for name, (_, engines, share) in FAMILIES.items():
-        wanted, engine, size = max(1, round(share * count)), itertools.cycle(engines), PER_SWEEP.get(name, 40)
-        while wanted > 0:
-            rounds.append((name, next(engine), min(size, wanted)))
-            wanted -= size
-    return rounds
-
-
 def main() -> None:
     """Run the campaign, or go on with it."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -471,32 +460,46 @@ def main() -> None:
 
 
 def run(options: argparse.Namespace, work: Path) -> None:
-    """Run the rounds that are not in the table yet."""
+    """Hurt sweeps until each family has its share of the faults; those in the table count.
+
+    A sweep may come to its end before all of its faults have hit it: the rest go to another.
+    """
     rows: list[dict[str, Any]] = pd.read_csv(options.rows).to_dict("records") if options.rows.exists() else []
-    done = {row["round"] for row in rows if row["seed"] == options.seed}
     sweeps: dict[str, Sweep] = {}
-    for index, (name, engine, count) in enumerate(plan(options.count)):
-        if index in done or name not in (options.family or FAMILIES) or engine != (options.engine or engine):
+    for name, (_, both, share) in FAMILIES.items():
+        engines = [engine for engine in both if engine == (options.engine or engine)]
+        if name not in (options.family or FAMILIES) or not engines or not possible(name, engines):
             continue
-        if engine == "liggghts" and find_executable() is None:
-            print(f"{name}: left out, LIGGGHTS is not installed", flush=True)
-            continue
-        if name in SELF_JUDGED and not may_mount():
-            print(f"{name}: left out, only root may mount a disk", flush=True)
-            continue
-        if engine not in sweeps:
-            sweeps[engine] = Sweep.make(work / engine, engine)
-        began = time.monotonic()
-        faults = run_family(name, sweeps[engine], count, random.Random(f"{options.seed} {index}"), options.minutes)
-        rows += [{"seed": options.seed, "round": index, **asdict(fault)} for fault in faults]
-        options.rows.parent.mkdir(parents=True, exist_ok=True)
-        pd.DataFrame(rows).to_csv(options.rows, index=False)
-        bad = sum(not fault.equal or fault.lost + fault.accepted + fault.left > 0 for fault in faults)
-        print(
-            f"{name} ({engine}): {len(faults)} faults, {bad} with a problem, {time.monotonic() - began:.0f} s; "
-            f"{len(rows)} in all",
-            flush=True,
-        )
+        while True:
+            mine = [row for row in rows if (row["seed"], row["family"]) == (options.seed, name)]
+            missing, before = math.ceil(share * options.count) - len(mine), len({row["round"] for row in mine})
+            if missing <= 0:
+                break
+            engine = engines[before % len(engines)]
+            if engine not in sweeps:
+                sweeps[engine] = Sweep.make(work / engine, engine)
+            began, rng = time.monotonic(), random.Random(f"{options.seed} {name} {before}")
+            faults = run_family(name, sweeps[engine], min(missing, PER_SWEEP.get(name, 40)), rng, options.minutes)
+            number = len({row["round"] for row in rows if row["seed"] == options.seed})
+            rows += [{"seed": options.seed, "round": number, **asdict(fault)} for fault in faults]
+            options.rows.parent.mkdir(parents=True, exist_ok=True)
+            pd.DataFrame(rows).to_csv(options.rows, index=False)
+            bad = sum(not fault.equal or fault.lost + fault.accepted + fault.left > 0 for fault in faults)
+            took = f"{time.monotonic() - began:.0f} s; {len(rows)} in all"
+            print(f"{name} ({engine}): {len(faults)} faults, {bad} with a problem, {took}", flush=True)
+            if not faults:  # its time is over
+                break
+
+
+def possible(name: str, engines: list[str]) -> bool:
+    """Whether a family can be run here; says why if not."""
+    if engines[0] == "liggghts" and find_executable() is None:
+        print(f"{name}: left out, LIGGGHTS is not installed", flush=True)
+        return False
+    if name in SELF_JUDGED and not may_mount():
+        print(f"{name}: left out, only root may mount a disk", flush=True)
+        return False
+    return True
 
 
 if __name__ == "__main__":
