@@ -164,9 +164,10 @@ def killed_programs(trial: Trial, count: int) -> None:
 def failing_programs(trial: Trial, count: int) -> None:
     """A LIGGGHTS that fails in many ways: garbage, wrong version, hanging, out of memory, dead with status 0."""
     trial.sweep.clear()
-    ways = [way for way in FAKES if way != "hangs"]
-    chosen = ["hangs", "hangs", *itertools.islice(itertools.cycle(ways), max(0, count - 2))][:count]
-    trial.rng.shuffle(chosen)
+    first, again = list(FAKES), [way for way in FAKES if way != "hangs"]  # hanging takes until the time limit: once
+    trial.rng.shuffle(first)
+    trial.rng.shuffle(again)
+    chosen = [*first, *itertools.islice(itertools.cycle(again), max(0, count - len(first)))][:count]
     listed = trial.sweep.root / "ways"
     listed.with_suffix(".used").unlink(missing_ok=True)
     listed.write_text("\n".join(chosen))
@@ -472,7 +473,7 @@ def run(options: argparse.Namespace, work: Path) -> None:
             continue
         while True:
             mine = [row for row in rows if (row["seed"], row["family"]) == (options.seed, name)]
-            missing, before = math.ceil(share * options.count) - len(mine), len({row["round"] for row in mine})
+            missing, before = max(1, round(share * options.count)) - len(mine), len({row["round"] for row in mine})
             if missing <= 0:
                 break
             engine = engines[before % len(engines)]
