@@ -505,6 +505,12 @@ CLOUD_AS_DUMP = (
 )
 """Dumps the cloud as it was given."""
 
+TRUE_TO_THE_CLOUD = (
+    "sed '1,/^Atoms/d' cloud.data | awk 'NF == 7 {m += $3^3; h += $7 * $3^3} END "
+    '{printf "@state 0 100 5 1000\\n@state 10 %.17g 0 1000\\n@finished 10\\n", h / m}\''
+)
+"""Says what a deck says that left the cloud where it was."""
+
 LIARS = [
     pytest.param("head -c 5000 /dev/urandom", "ended before its deck did", 3, id="prints garbage"),
     pytest.param("head -c 5000 /dev/urandom; exit 3", "ended with status 3", 3, id="prints garbage and fails"),
@@ -523,7 +529,19 @@ LIARS = [
         f"{FINISHED}; {CLOUD_AS_DUMP} | head -n 60 > final.dump", "promises 100 atoms but holds 51", 3, id="half a dump"
     ),
     pytest.param(
-        f"{FINISHED}; {CLOUD_AS_DUMP} > final.dump", "not settled after 10 steps", 1, id="leaves it in the air"
+        f"{TRUE_TO_THE_CLOUD}; {CLOUD_AS_DUMP} > final.dump", "not settled after 10 steps", 1, id="leaves it in the air"
+    ),
+    pytest.param(
+        f"{TRUE_TO_THE_CLOUD}; {CLOUD_AS_DUMP} | awk 'FNR == 12 {{$5 += 1e-4}} {{print}}' > final.dump",
+        r"the final dump is damaged: mean height \S+ m and kinetic energy .* where LIGGGHTS printed \S+ m",
+        3,
+        id="moves a sphere",
+    ),
+    pytest.param(
+        f"{TRUE_TO_THE_CLOUD}; {CLOUD_AS_DUMP} | awk 'FNR == 12 {{$6 = 1e-9}} {{print}}' > final.dump",
+        "the final dump is damaged",
+        3,
+        id="sets a sphere going",
     ),
     pytest.param(
         f"{FINISHED}; {CLOUD_AS_DUMP} | sed '12s/ 0 0 0 / nan 0 0 /' > final.dump",

@@ -481,7 +481,7 @@ def run(options: argparse.Namespace, work: Path) -> None:
                 sweeps[engine] = Sweep.make(work / engine, engine)
             began, rng = time.monotonic(), random.Random(f"{options.seed} {name} {before}")
             faults = run_family(name, sweeps[engine], min(missing, PER_SWEEP.get(name, 40)), rng, options.minutes)
-            number = len({row["round"] for row in rows if row["seed"] == options.seed})
+            number = 1 + max((row["round"] for row in rows if row["seed"] == options.seed), default=-1)
             rows += [{"seed": options.seed, "round": number, **asdict(fault)} for fault in faults]
             options.rows.parent.mkdir(parents=True, exist_ok=True)
             pd.DataFrame(rows).to_csv(options.rows, index=False)

@@ -19,7 +19,7 @@ from filtercake.packing.engines.base import SettleRequest, parallelism
 from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
 from filtercake.packing.engines.micro import UnitSystem
 from filtercake.packing.result import SettledState
-from filtercake.packing.settling import WINDOW
+from filtercake.packing.settling import WINDOW, Trajectory
 from filtercake.packing.spec import PackingSpec
 from filtercake.units import GRAVITY, FloatArray
 
@@ -31,6 +31,8 @@ LOOK_SECONDS = 5.0
 
 _BLOWN_UP = ("Lost atoms", "Non-numeric", "out of range", "Out of range", "neighbor list", "Bond atoms missing")
 """Words of LIGGGHTS's errors about spheres that fly apart, not about its input."""
+SAME = 1e-9
+"""Relative difference that a dump may have from what LIGGGHTS printed; they agree to 1e-14."""
 _COLUMNS = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
 
 
@@ -114,15 +116,19 @@ class Liggghts:
         check_end(status, log)
         position, velocity, radius = read_dump(folder / "final.dump", self.units)
         length = request.cloud.length
+        seen = trajectory(log, spec.time_step, length, spec.density, self.units)
+        wanted = expected if expected is not None else (log.inserted or 0)
+        if radius.size == wanted:  # one that lacks spheres is told so by the acceptance checks
+            check_dump(position, velocity, 4.0 / 3.0 * np.pi * spec.density * radius**3, seen)
         position[:, :2] %= length
         return SettledState(
             position=position,
             velocity=velocity,
             radius=radius,
             length=length,
-            trajectory=trajectory(log, spec.time_step, length, spec.density, self.units),
+            trajectory=seen,
             steps=log.finished_step or 0,
-            expected=expected if expected is not None else (log.inserted or 0),
+            expected=wanted,
             dangerous_builds=log.dangerous_builds,
             engine=self.name,
             engine_version=log.version,
@@ -264,6 +270,35 @@ def read_dump(path: Path, units: UnitSystem = micro.MICRO) -> tuple[FloatArray, 
         raise EngineError("the final dump holds an atom twice", transient=True)
     table = table[np.argsort(table[:, 0])]
     return table[:, 2:5] * units.length, table[:, 5:8] * units.velocity, table[:, 8] * units.length
+
+
+def check_dump(position: FloatArray, velocity: FloatArray, mass: FloatArray, seen: Trajectory) -> None:
+    """Hold the final dump against what LIGGGHTS printed last: mean height and kinetic energy of all spheres.
+
+    Parameters
+    ----------
+    position, velocity : ndarray, shape (n, 3)
+        As dumped, m and m/s.
+    mass : ndarray, shape (n,)
+        Masses of the spheres, kg.
+    seen : Trajectory
+        What was printed, of the same step as the dump at its end.
+
+    Raises
+    ------
+    EngineError
+        If they differ, so that the file was damaged on its way (transient: try again). Values that are not finite are
+        left to the acceptance checks: the bed may have exploded.
+    """
+    height = float(mass @ position[:, 2] / mass.sum())
+    energy = float(0.5 * mass @ (velocity**2).sum(axis=1))
+    told = (float(seen.mean_height[-1]), float(seen.kinetic_energy[-1]))
+    if np.isfinite((height, energy, *told)).all() and not np.allclose((height, energy), told, rtol=SAME, atol=0.0):
+        raise EngineError(
+            f"the final dump is damaged: mean height {height:.9g} m and kinetic energy {energy:.9g} J of its spheres, "
+            f"where LIGGGHTS printed {told[0]:.9g} m and {told[1]:.9g} J",
+            transient=True,
+        )
 
 
 def check_end(status: int, log: LiggghtsLog) -> None:
