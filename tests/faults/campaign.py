@@ -167,7 +167,11 @@ def failing_programs(trial: Trial, count: int) -> None:
     first, again = list(FAKES), [way for way in FAKES if way != "hangs"]  # hanging takes until the time limit: once
     trial.rng.shuffle(first)
     trial.rng.shuffle(again)
-    chosen = [*first, *itertools.islice(itertools.cycle(again), max(0, count - len(first)))][:count]
+    fail_with(trial, [*first, *itertools.islice(itertools.cycle(again), max(0, count - len(first)))][:count])
+
+
+def fail_with(trial: Trial, chosen: list[str]) -> None:
+    """Run a sweep whose first LIGGGHTS processes fail in these ways, one after another."""
     listed = trial.sweep.root / "ways"
     listed.with_suffix(".used").unlink(missing_ok=True)
     listed.write_text("\n".join(chosen))

@@ -39,6 +39,19 @@ def test_one_command_resumes(name, sweep):
         assert (fault.lost, fault.accepted, fault.left, fault.commands, fault.equal) == (0, 0, 0, 1, True), fault
 
 
+@pytest.mark.parametrize("way", campaign.FAKES)
+def test_one_failure_of_liggghts_alone_is_got_over(way, sweep):
+    if find_executable() is None:
+        pytest.skip("LIGGGHTS is not installed")
+    made = sweep("liggghts")
+    made.targets = campaign.TABLES_ONLY
+    made.clear()
+    trial = campaign.Trial(made, random.Random(way), "failing_programs")
+    campaign.fail_with(trial, [way])
+    (fault,) = trial.judge()
+    assert (fault.kind, fault.lost, fault.accepted, fault.left, fault.commands, fault.equal) == (way, 0, 0, 0, 1, True)
+
+
 def test_the_campaign_sees_one_other_digit(sweep):
     made = sweep(campaign.FAMILIES["clocks"][1][0])
     assert made.differing() == [] and made.wrong() == 0
