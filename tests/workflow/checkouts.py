@@ -40,10 +40,6 @@ class Checkout:
     def run(self, *arguments: str, study: str = TINY, **environment: str) -> subprocess.CompletedProcess:
         return self.snakemake("--config", f"studies={study}", *arguments, **environment)
 
-    def resume(self, *arguments: str, study: str = TINY) -> subprocess.CompletedProcess:
-        """What ``make resume`` does."""
-        return self.snakemake("--config", f"studies={study}", *arguments, module="filtercake.resume")
-
     def planned(self, study: str = TINY) -> Counter:
         """Jobs that a run would start, by rule."""
         done = self.run("--dry-run", "--quiet", "host", study=study)
@@ -55,11 +51,12 @@ class Checkout:
 
 
 def copy_project(target: Path) -> Checkout:
+    """Copy the project, with the kernels that are compiled already."""
     target.mkdir(parents=True, exist_ok=True)
     for part in PARTS:
         source = PROJECT / part
         if source.is_dir():
-            shutil.copytree(source, target / part, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+            shutil.copytree(source, target / part, ignore=shutil.ignore_patterns("*.egg-info"))
         else:
             shutil.copy(source, target / part)
     return Checkout(target)

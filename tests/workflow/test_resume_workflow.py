@@ -61,12 +61,13 @@ def test_a_killed_run_resumes_and_gives_the_tables_of_an_undisturbed_one(embedde
     finished = {path: path.stat().st_mtime_ns for path in results.glob("packings/*/r[0-9].npz")}
     complete = {path for path in finished if path.with_suffix(".json").exists()}
     assert len(complete) >= 3
-    done = embedded.resume(study=STUDY)
+    table = "results/resumed/summary.csv"
+    done = embedded.snakemake(table, "--config", f"studies={STUDY}", module="filtercake.resume")
     assert done.returncode == 0, done.stderr
     assert all(path.stat().st_mtime_ns == finished[path] for path in complete)
     assert not list(results.rglob(".work")) and not list(results.rglob(".r*.npz.*"))
     resumed = pd.read_csv(results / "summary.csv").drop(columns="wall_s")
-    fresh = embedded.run("results=undisturbed", study=STUDY)
+    fresh = embedded.run("results=undisturbed", "--", "undisturbed/resumed/summary.csv", study=STUDY)
     assert fresh.returncode == 0, fresh.stderr
     undisturbed = pd.read_csv(embedded.root / "undisturbed/resumed/summary.csv").drop(columns="wall_s")
     pd.testing.assert_frame_equal(resumed, undisturbed, check_exact=True)

@@ -57,7 +57,8 @@ def test_spoiled_packings_are_rows_with_reasons(checkout):
     text = text.partition("sweeps:")[0].replace("replicates: 2", "replicates: 1")
     text += "sweeps:\n  - csd: bimodal\n    cohesion_kJ_m3: [1, 2, 3, 4, 5, 50]\n"
     (checkout.root / "config/test/spoiled.yaml").write_text(text)
-    done = checkout.run(study="config/test/spoiled.yaml", FILTERCAKE_LIGGGHTS=str(spoiler))
+    table = "results/spoiled/summary.csv"
+    done = checkout.run("--", table, study="config/test/spoiled.yaml", FILTERCAKE_LIGGGHTS=str(spoiler))
     output = done.stdout + done.stderr
     assert done.returncode == 0, output
     rows = pd.read_csv(checkout.root / "results/spoiled/replicates.csv").set_index("cohesion_kJ_m3")
