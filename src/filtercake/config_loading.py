@@ -42,6 +42,8 @@ OWN_NAMES = ("benchmark", "benchmark_quick", "benchmarks", "logs", "pages")
 OWN_PREFIXES = ("agreement_", "calibration_")
 """How the names begin of the studies that the workflow makes itself."""
 
+_OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
+
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -134,9 +136,6 @@ def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
     if problems:
         raise ConfigError(problems)
     return paths
-
-
-_OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
 
 
 def _is_own(path: Path, benchmarks: Path) -> bool:
