@@ -115,7 +115,10 @@ def build_parser() -> words.Parser:
 
 def _command(commands: Any, name: str, run: Command, text: str) -> words.Parser:
     parser: words.Parser = commands.add_parser(
-        name, help=text, description=text, epilog=f"example:\n  {EXAMPLES[name]}"
+        name,
+        help=text.replace("%", "%%"),  # argparse formats this one, and takes the description as it is
+        description=text,
+        epilog=f"example:\n  {EXAMPLES[name]}"
     )
     parser.set_defaults(run=run, prog=parser.prog)
     parser.add_argument("--json", action="store_true", help="print one JSON object")

@@ -132,12 +132,20 @@ def test_a_mistake_is_one_clear_line(arguments: list[str], said: str, capsys: Ca
     assert said in complaint(arguments, capsys)
 
 
+def test_help_lists_every_command(capsys: Capture) -> None:
+    assert main(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"\n    {command}" in printed for command in ALL_COMMANDS)
+    assert "95 % intervals" in printed and "%%" not in printed
+
+
 @pytest.mark.parametrize("command", ALL_COMMANDS)
 def test_help_names_units_and_an_example(command: str, capsys: Capture) -> None:
     assert main([command, "--help"]) == 0
     printed = capsys.readouterr().out
     assert command not in COMMANDS or "um" in printed or "m3" in printed
     assert f"filtercake {command}" in printed.split("example:")[1]
+    assert "%%" not in printed
 
 
 @pytest.fixture(scope="module")
