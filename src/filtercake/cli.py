@@ -118,7 +118,7 @@ def _command(commands: Any, name: str, run: Command, text: str) -> words.Parser:
         name,
         help=text.replace("%", "%%"),  # argparse formats this one, and takes the description as it is
         description=text,
-        epilog=f"example:\n  {EXAMPLES[name]}"
+        epilog=f"example:\n  {EXAMPLES[name]}",
     )
     parser.set_defaults(run=run, prog=parser.prog)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
