@@ -61,7 +61,7 @@ format: setup ## format the code
 	$(BIN)/snakefmt Snakefile workflow
 
 schemas: setup ## regenerate the JSON schemas and the reference of config keys
-	$(BIN)/python -m filtercake.schema
+	$(BIN)/python -m filtercake.cli.schema
 
 calibrate: setup ## fit the cohesion to measured resistances (CALIBRATION=name of a file in config/calibrations)
 	$(SNAKEMAKE) calibrate --config calibrations=$(CALIBRATION)
@@ -126,10 +126,10 @@ references: setup ## remake the stored LIGGGHTS trajectories that the tests comp
 	$(BIN)/python tests/data/make_liggghts_data.py
 
 resume: setup ## go on after a kill, a crash or damage, with the same STUDIES or CALIBRATION; finished packings are kept
-	$(BIN)/python -m filtercake.resume $(PLACE) $(RESUMED)
+	$(BIN)/python -m filtercake.run.resume $(PLACE) $(RESUMED)
 
 retry: setup ## make the packings that failed once more
-	$(BIN)/python -m filtercake.retry results
+	$(BIN)/python -m filtercake.run.retry results
 	$(SNAKEMAKE) $(CONFIG)
 
 lock: setup ## renew the lock file from pyproject.toml

@@ -13,14 +13,14 @@ import pytest
 from hypothesis import settings
 from scipy.special import gammainc
 
-from filtercake import contact
-from filtercake.config_loading import LoadedStudy, load_study
-from filtercake.csd import CrystalSizeDistribution, Truncation, discretise, mixture, truncate
+from filtercake.crystals.csd import CrystalSizeDistribution, Truncation, discretise, mixture, truncate
+from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines.liggghts import find_executable
 from filtercake.packing.result import SettledState
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import StopRule, Trajectory
-from filtercake.packing.spec import PackingSpec
+from filtercake.study.loading import LoadedStudy, load_study
 
 settings.register_profile("filtercake", max_examples=50, deadline=None, derandomize=True)
 settings.load_profile("filtercake")
@@ -70,7 +70,7 @@ def make_spec() -> Callable[..., PackingSpec]:
     """A spec of PMMA at the paper's values; keywords replace some of them."""
     base = PackingSpec(
         particles=300,
-        void_fraction=0.65,
+        initial_void_fraction=0.65,
         settling_velocity=0.01,
         density=1180.0,
         youngs_modulus=5e6,
@@ -78,7 +78,7 @@ def make_spec() -> Callable[..., PackingSpec]:
         restitution=0.3,
         friction=0.0,
         cohesion=50e3,
-        time_step=0.36 * contact.rayleigh_time_step(15 * UM, 1180.0, 5e6, 0.2),
+        time_step=0.36 * contact_law.rayleigh_time_step(15 * UM, 1180.0, 5e6, 0.2),
         engine="liggghts",
     )
     return lambda **changes: dataclasses.replace(base, **changes)

@@ -2,7 +2,7 @@
 
 import sys
 
-from filtercake.cli import main
+from filtercake.cli.commands import main
 
 if __name__ == "__main__":
     sys.exit(main())

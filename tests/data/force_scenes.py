@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from filtercake.packing.engines.liggghts import contact_model, find_executable, render
-from filtercake.packing.spec import PackingSpec
+from filtercake.packing.scene import PackingSpec
 
 REFERENCES = Path(__file__).with_name("force_references.npz")
 LENGTH_UM = 600.0
@@ -35,7 +35,7 @@ class Scene:
     def spec(self):
         return PackingSpec(
             particles=len(self.radius),
-            void_fraction=0.65,
+            initial_void_fraction=0.65,
             settling_velocity=0.01,
             density=1180.0,
             youngs_modulus=5e6,

@@ -13,15 +13,15 @@ import threading
 import time
 from pathlib import Path
 
-from filtercake import contact
-from filtercake.csd import mixture
+from filtercake.crystals.csd import mixture
 from filtercake.errors import EngineError
+from filtercake.packing import contact_law
 from filtercake.packing.cloud import make_cloud
 from filtercake.packing.engines import liggghts
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import StopRule
-from filtercake.packing.spec import PackingSpec
 
 DATA = Path(__file__).resolve().parent / "liggghts"
 
@@ -29,9 +29,9 @@ DATA = Path(__file__).resolve().parent / "liggghts"
 def request(folder: Path, checks: int, check_steps: int = 400) -> SettleRequest:
     """Sixty spheres of 30 and 50 um."""
     csd = mixture([30e-6, 50e-6], [0.5, 0.5])
-    step = 0.36 * contact.rayleigh_time_step(15e-6, 1180.0, 5e6, 0.2)
+    step = 0.36 * contact_law.rayleigh_time_step(15e-6, 1180.0, 5e6, 0.2)
     spec = PackingSpec(60, 0.75, 0.01, 1180.0, 5e6, 0.2, 0.3, 0.0, 50e3, step, "liggghts")
-    cloud = make_cloud(csd, spec.particles, spec.void_fraction, 1)
+    cloud = make_cloud(csd, spec.particles, spec.initial_void_fraction, 1)
     rule = dataclasses.replace(StopRule.for_bed(spec, cloud.length), max_checks=checks, check_steps=check_steps)
     return SettleRequest(spec, csd, cloud, rule, 1, folder, print)
 

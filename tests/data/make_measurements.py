@@ -49,7 +49,7 @@ ENTRY = """\
     area_cm2: {area:g}
     pressure_drop_kPa: {pressure:g}
     viscosity_mPa_s: {viscosity:g}
-    slurry_concentration_kg_m3: {concentration:g}      # dry cake per volume of filtrate
+    solids_per_filtrate_kg_m3: {concentration:g}      # dry cake per volume of filtrate
 """
 
 CSV = """\

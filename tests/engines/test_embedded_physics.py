@@ -6,27 +6,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from filtercake import contact
-from filtercake.csd import mixture
+from filtercake.crystals.csd import mixture
 from filtercake.errors import CloudError, EngineError, PackingRejected
+from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud, make_cloud
 from filtercake.packing.contacts import find_contacts
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.embedded import Bed, Embedded
 from filtercake.packing.pack import pack
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import StopRule
-from filtercake.packing.spec import PackingSpec
 
 RADIUS = 10e-6
 LENGTH = 600e-6
 HIGH = 300e-6
-MODULUS = contact.effective_modulus(5e6, 0.2)
+MODULUS = contact_law.effective_modulus(5e6, 0.2)
 
 
 def spec(**changes):
     values = {
         "particles": 2,
-        "void_fraction": 0.65,
+        "initial_void_fraction": 0.65,
         "settling_velocity": 0.01,
         "density": 1180.0,
         "youngs_modulus": 5e6,
@@ -68,7 +68,7 @@ def test_pairs_come_to_rest_at_the_equilibrium_overlap():
     bed.advance(20_000)
     gap, speed = opening(bed)
     # the closed form takes 2 pi R* d for the lens; at 0.2 % overlap that is good to about as much
-    assert -gap == pytest.approx(contact.equilibrium_overlap(50e3, 5e6, 0.2, RADIUS, RADIUS), rel=0.01)
+    assert -gap == pytest.approx(contact_law.equilibrium_overlap(50e3, 5e6, 0.2, RADIUS, RADIUS), rel=0.01)
     assert abs(speed) < 1e-6
 
 
@@ -76,7 +76,7 @@ def test_pairs_come_to_rest_at_the_equilibrium_overlap():
 def test_escape_speed_of_a_cohesive_pair(factor, escapes):
     cohesion, density = 100e3, 1180.0
     escape = math.sqrt(37.0 * cohesion**5 / (density * MODULUS**4))
-    overlap = contact.equilibrium_overlap(cohesion, 5e6, 0.2, RADIUS, RADIUS)
+    overlap = contact_law.equilibrium_overlap(cohesion, 5e6, 0.2, RADIUS, RADIUS)
     bed = pair(-overlap, -factor * escape, spec(cohesion=cohesion, restitution=0.9999))
     bed.advance(40_000)
     gap, _ = opening(bed)
@@ -87,11 +87,11 @@ def test_pull_off_force_is_the_largest_attraction():
     cohesion = 50e3
     strongest = 0.0
     for share in np.linspace(0.3, 0.6, 31):
-        overlap = share * contact.equilibrium_overlap(cohesion, 5e6, 0.2, RADIUS, RADIUS)
+        overlap = share * contact_law.equilibrium_overlap(cohesion, 5e6, 0.2, RADIUS, RADIUS)
         bed = pair(-overlap, 0.0, spec(cohesion=cohesion))
         bed.advance(0)
         strongest = max(strongest, bed.force[0, np.argsort(bed.identity)[0], 0])
-    assert strongest == pytest.approx(contact.pull_off_force(cohesion, 5e6, 0.2, RADIUS, RADIUS), rel=0.01)
+    assert strongest == pytest.approx(contact_law.pull_off_force(cohesion, 5e6, 0.2, RADIUS, RADIUS), rel=0.01)
 
 
 def cluster(n=60, seed=5, friction=0.0, cohesion=50e3, gravity=0.0, shift=0.0):
@@ -190,7 +190,7 @@ def test_one_sphere_comes_to_rest_on_the_floor():
     cloud = Cloud(np.array([[50e-6, 50e-6, 60e-6]]), np.array([RADIUS]), 100e-6, 200e-6)
     state, rule = settle(cloud, spec(particles=1, cohesion=50e3, time_step=0.1e-6))
     assert rule.settled_at(state.trajectory) is not None
-    resting = RADIUS - contact.equilibrium_overlap(50e3, 5e6, 0.2, RADIUS, math.inf)
+    resting = RADIUS - contact_law.equilibrium_overlap(50e3, 5e6, 0.2, RADIUS, math.inf)
     assert state.position[0, 2] == pytest.approx(resting, rel=1e-3)
 
 

@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from filtercake.csd import mixture
+from filtercake.crystals.csd import mixture
 from filtercake.packing.cloud import Cloud, make_cloud
 from filtercake.packing.engines import embedded
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.embedded_bed import Bed
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import StopRule
-from filtercake.packing.spec import PackingSpec
 
 CSD = mixture([20e-6, 50e-6], [0.5, 0.5])
 SPEC = PackingSpec(
     particles=400,
-    void_fraction=0.65,
+    initial_void_fraction=0.65,
     settling_velocity=0.01,
     density=1180.0,
     youngs_modulus=5e6,
@@ -54,7 +54,7 @@ def apart(one, other):
 )
 def test_free_fall_left_out_changes_nothing(speed, steps, friction):
     spec = replace(SPEC, settling_velocity=speed, time_step=0.05e-6 if speed > 0.1 else 0.1e-6, friction=friction)
-    cloud = make_cloud(CSD, spec.particles, spec.void_fraction, 1)
+    cloud = make_cloud(CSD, spec.particles, spec.initial_void_fraction, 1)
     lazy, eager = Bed.from_cloud(cloud, spec), all_awake(cloud, spec)
     for bed in (lazy, eager):
         bed.advance(steps)
@@ -78,7 +78,7 @@ def test_a_chain_of_spheres_wakes_upwards():
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_the_neighbour_skin_changes_nothing(friction):
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.void_fraction, 1)
+    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
     beds = [Bed.from_cloud(cloud, replace(SPEC, friction=friction, skin=skin)) for skin in (0.4e-6, 3e-6, 30e-6)]
     for bed in beds:
         bed.advance(12_000)
@@ -87,7 +87,7 @@ def test_the_neighbour_skin_changes_nothing(friction):
 
 
 def test_a_bed_costs_pairs_only_where_it_lies():
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.void_fraction, 1)
+    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
     bed = Bed.from_cloud(cloud, SPEC)
     bed.advance(12_000)
     # a quarter of the fall: most spheres are still on their parabola
@@ -106,7 +106,7 @@ def request(cloud, spec, folder, progress=lambda _line: None):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_bed_killed_halfway_ends_as_one_that_was_not(tmp_path: Path, monkeypatch, friction):
     spec = replace(SPEC, particles=200, friction=friction, time_step=0.15e-6)
-    cloud = make_cloud(CSD, spec.particles, spec.void_fraction, 1)
+    cloud = make_cloud(CSD, spec.particles, spec.initial_void_fraction, 1)
     undisturbed = Embedded().settle(request(cloud, spec, tmp_path))
     assert not list(tmp_path.glob("*"))  # a short packing saves nothing
     monkeypatch.setattr(embedded, "STATE_SECONDS", 0.0)
@@ -135,7 +135,7 @@ def test_a_bed_killed_halfway_ends_as_one_that_was_not(tmp_path: Path, monkeypat
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 cut short", b"not an archive"])
 def test_a_damaged_state_is_as_none(tmp_path: Path, damage):
     spec = replace(SPEC, particles=60, time_step=0.25e-6)
-    cloud = make_cloud(CSD, spec.particles, spec.void_fraction, 1)
+    cloud = make_cloud(CSD, spec.particles, spec.initial_void_fraction, 1)
     undisturbed = Embedded().settle(request(cloud, spec, tmp_path))
     (tmp_path / "bed.state.npz").write_bytes(damage)
     assert np.array_equal(Embedded().settle(request(cloud, spec, tmp_path)).position, undisturbed.position)
@@ -143,7 +143,7 @@ def test_a_damaged_state_is_as_none(tmp_path: Path, damage):
 
 def test_reports_say_how_many_are_down_and_when_it_ends(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.0)
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.void_fraction, 1)
+    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
     lines = []
     Embedded().settle(request(cloud, replace(SPEC, time_step=0.25e-6), tmp_path, lines.append))
     down = [int(re.search(r", ([\d,]+) of 400 spheres down, ", line).group(1).replace(",", "")) for line in lines]
@@ -154,7 +154,7 @@ def test_reports_say_how_many_are_down_and_when_it_ends(tmp_path: Path, monkeypa
 
 def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, monkeypatch):
     clock = [0.0]
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.void_fraction, 1)
+    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
     spec = replace(SPEC, time_step=0.25e-6)
     advance = embedded.Bed.advance
     lines = []

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from filtercake.csd import CrystalSizeDistribution, mixture
+from filtercake.crystals.csd import CrystalSizeDistribution, mixture
 from filtercake.errors import EngineError, EngineMissing, PackingRejected
 from filtercake.packing import pack as pack_module
 from filtercake.packing.cloud import Cloud, make_cloud
@@ -28,10 +28,10 @@ from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.liggghts import Liggghts, find_executable, render, template_folder, write_cloud
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished, prime_seeds
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed, pack, pack_replicates
+from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, read_record
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import StopRule
-from filtercake.packing.spec import PackingSpec
-from filtercake.porosity import measure
 
 UM = 1e-6
 
@@ -49,7 +49,7 @@ def ask(tmp_path: Path, small_csd: CrystalSizeDistribution) -> Callable[..., Set
     """Make a request for a spec, with a scratch folder of its own."""
 
     def make(spec: PackingSpec, seed: int = 1) -> SettleRequest:
-        cloud = make_cloud(small_csd, spec.particles, spec.void_fraction, seed)
+        cloud = make_cloud(small_csd, spec.particles, spec.initial_void_fraction, seed)
         folder = tmp_path / "scratch"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
@@ -252,7 +252,7 @@ def test_pmma_gives_the_authors_porosity(
     step = 0.1e-6 if friction else 0.3e-6
     spec = make_spec(particles=2000, friction=friction, cohesion=cohesion, time_step=step)
     found = measure(pack(spec, pmma(0.5), 0, tmp_path), spec)
-    assert found.as_published == pytest.approx(published, abs=4 * 0.0037)
+    assert found.paper_count == pytest.approx(published, abs=4 * 0.0037)
     if cohesion:
         assert found.from_floor == pytest.approx(0.3610, abs=4 * 0.0015)
         assert found.from_floor > found.interior
@@ -472,9 +472,9 @@ def test_no_liggghts_outlives_a_killed_parent(
     # 2000 spheres take some 10 s: long enough to be found running
     code = (
         "import json, sys; from pathlib import Path\n"
-        "from filtercake.csd import mixture\n"
+        "from filtercake.crystals.csd import mixture\n"
         "from filtercake.packing.pack import pack_replicates\n"
-        "from filtercake.packing.spec import PackingSpec\n"
+        "from filtercake.packing.scene import PackingSpec\n"
         "spec = PackingSpec.from_dict(json.loads(sys.argv[1]))\n"
         "pack_replicates(spec, mixture([3e-5, 5e-5], [0.5, 0.5]), 1, Path(sys.argv[2]), 'code')\n"
     )

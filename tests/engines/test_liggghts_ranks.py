@@ -11,15 +11,15 @@ from pathlib import Path
 
 import pytest
 
-from filtercake.csd import mixture
+from filtercake.crystals.csd import mixture
 from filtercake.errors import EngineError
 from filtercake.packing.engines.liggghts import LOOK_SECONDS, find_executable
 from filtercake.packing.pack import pack
-from filtercake.packing.spec import PackingSpec
+from filtercake.packing.scene import PackingSpec
 
 SCENE = PackingSpec(
     particles=2000,
-    void_fraction=0.65,
+    initial_void_fraction=0.65,
     settling_velocity=0.01,
     density=1180.0,
     youngs_modulus=5e6,

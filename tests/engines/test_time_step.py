@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import pytest
 
-from filtercake import contact
-from filtercake.csd import mixture
+from filtercake.crystals.csd import mixture
 from filtercake.errors import PackingRejected
-from filtercake.fence import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
+from filtercake.packing import contact_law
 from filtercake.packing.pack import pack
-from filtercake.packing.spec import PackingSpec
+from filtercake.packing.scene import PackingSpec
+from filtercake.study.limits import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
 
 CSD = mixture([20e-6, 50e-6], [0.5, 0.5])
-RAYLEIGH = contact.rayleigh_time_step(10e-6, 1180.0, 5e6, 0.2)
+RAYLEIGH = contact_law.rayleigh_time_step(10e-6, 1180.0, 5e6, 0.2)
 SCENE = PackingSpec(
     particles=1000,
-    void_fraction=0.65,
+    initial_void_fraction=0.65,
     settling_velocity=0.01,
     density=1180.0,
     youngs_modulus=5e6,

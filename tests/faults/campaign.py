@@ -27,8 +27,8 @@ import pandas as pd
 import psutil
 from sweep import TABLES_ONLY, Sweep, wait_for
 
-from filtercake import pages
 from filtercake.packing.engines.liggghts import EXECUTABLE_VARIABLE, find_executable
+from filtercake.validation import pages
 
 TEMPLATE = Path(__file__).resolve().parents[2] / "workflow" / "report" / "reliability.md.j2"
 SIGNALS = ("SIGINT", "SIGTERM", "SIGKILL")
@@ -375,7 +375,7 @@ def two_runs(trial: Trial, count: int) -> None:
         wait_for(lambda: first.poll() is not None, trial.rng.uniform(0.0, 4.0))
         if first.poll() is not None:
             break
-        module = trial.rng.choice(("filtercake.resume", "filtercake.resume", "snakemake"))
+        module = trial.rng.choice(("filtercake.run.resume", "filtercake.run.resume", "snakemake"))
         moment = time.monotonic()
         trial.sweep.start(module=module)
         fault = trial.hit("second_run", module.rpartition(".")[2], started)

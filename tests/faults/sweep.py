@@ -18,9 +18,9 @@ import pandas as pd
 import psutil
 
 from filtercake.errors import PackingRejected
-from filtercake.job import FOLDER_VARIABLE
 from filtercake.packing.result import Packing, sha256
-from filtercake.resume import live_runs, remains
+from filtercake.run.job import FOLDER_VARIABLE
+from filtercake.run.resume import live_runs, remains
 
 PROJECT = Path(__file__).resolve().parents[2]
 PARTS = ("Snakefile", "Makefile", "config", "workflow", "profiles", "liggghts_templates", "src")
@@ -75,7 +75,7 @@ class Sweep:
         """Environment of a run: the copy's library, temporary files where they are seen."""
         return {**os.environ, "PYTHONPATH": str(self.root / "src"), "TMPDIR": str(self.root / "tmp"), **extra}
 
-    def start(self, *prefix: str, module: str = "filtercake.resume", **extra: str) -> None:
+    def start(self, *prefix: str, module: str = "filtercake.run.resume", **extra: str) -> None:
         """Start a run in a process group of its own."""
         command = [*prefix, sys.executable, "-m", module, "--cores", "2", *self.targets, "--config", f"studies={STUDY}"]
         with (self.root / "output.log").open("wb") as stream:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 import json
 import math
@@ -18,25 +19,25 @@ from unittest import mock
 
 import mutation
 
-from filtercake import bed, cli, export
-from filtercake.calibration_config import LoadedCalibration, candidates, load_calibrations, settings_of
-from filtercake.config_loading import LoadedStudy, find_studies, load_studies, load_workflow
-from filtercake.csd import to_table
+from filtercake.calibration.config import LoadedCalibration, candidates, load_calibrations, settings_of
+from filtercake.calibration.measurements import compressibility_table, fits_table
+from filtercake.cli import commands as cli
+from filtercake.crystals.csd import to_table
 from filtercake.errors import FiltercakeError, PackingRejected
-from filtercake.measurements import compressibility_table, fits_table
-from filtercake.study import Point, expand
+from filtercake.study.loading import LoadedStudy, find_studies, load_studies, load_workflow
+from filtercake.study.points import Point, expand
 from filtercake.user_files import read_yaml
 
 PROJECT = Path(__file__).resolve().parents[2]
 CONFIG, STUDIES, CALIBRATIONS = "config/config.yaml", Path("config/studies"), Path("config/calibrations")
 OWN_KINETICS = """\
-crystallizer: {kinetics: mine, kinetics_file: kinetics.yaml, slurry_density_kg_m3: 200}
+crystallizer: {kinetics: mine, kinetics_file: kinetics.yaml, slurry_concentration_kg_m3: 200}
 filter: {pressure_drop_kPa: 53, submerged_fraction: 0.3, rotation_rate_rpm: 0.2, medium_resistance_1_m: 5.0e+9}
 material: {}
 sweeps: [{residence_time_min: [15, 30], cohesion_kJ_m3: [0, 50]}]
 """
 KINETICS = """\
-mine: {nucleation_coefficient: 9.0e+16, units: "B0 #/(L s), MT g/L, G m/s", slurry_density_exponent: 1,
+mine: {nucleation_coefficient: 9.0e+16, units: "B0 #/(L s), MT g/L, G m/s", slurry_concentration_exponent: 1,
   growth_rate_exponent: 2, shape_factor: 1, density_kg_m3: 2450, residence_time_range_min: [15, 60], source: made up}
 """
 TRICKS = ("config", "config/test", "config/studies", "config/test/calibration", "config/measurements")
@@ -161,12 +162,13 @@ KINDS = {
 COMMANDS = (
     "csd --mixture 20:0.5,50:0.5 --output out/x.csv",
     "csd config/test/tiny.csv --truncate-below-volume-fraction 0.01 --json",
-    "csd --kinetics ammonium_alum --residence-time-min 15 --slurry-density-kg-m3 200 --bin-width-um 5",
-    "csd --kinetics mine --kinetics-file config/studies/kinetics.yaml --residence-time-min 15 --slurry-density-kg-m3 9",
-    "pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --porosity-interval 0.003 --particles 50 --output out/packing",
+    "csd --kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200 --bin-width-um 5",
+    "csd --kinetics mine --kinetics-file config/studies/kinetics.yaml --residence-time-min 15 "
+    "--slurry-concentration-kg-m3 9",
+    "pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --porosity-ci95-target 0.003 --particles 50 --output out/beds",
     "pack config/test/tiny.csv --density-kg-m3 1180 --youngs-modulus-MPa 5 --seed 3 --time-step-us 0.1 --output out/p",
     "resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5 --sphericity 0.9 --json",
-    "filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-density-kg-m3 200 --pressure-drop-kPa 53.3 "
+    "filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 --pressure-drop-kPa 53.3 "
     "--submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9 --porosity 0.3 --density-kg-m3 2450",
     "porosity config/test/tiny.npz --profile",
     "export pmma pmma_50_50 --results out --output out/export",
@@ -210,8 +212,8 @@ def run_command(words: list[str]) -> None:
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True) for _ in range(2))
     rejected = PackingRejected(["nothing is packed here"])
     with (
-        mock.patch.object(bed, "pack_replicates", side_effect=rejected),
-        mock.patch.object(export, "pack", side_effect=rejected),
+        mock.patch.object(importlib.import_module("filtercake.api.pack"), "pack_replicates", side_effect=rejected),
+        mock.patch.object(importlib.import_module("filtercake.api.export"), "pack", side_effect=rejected),
         mock.patch.dict(os.environ, {cli.TRACEBACK_VARIABLE: "1"}),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),

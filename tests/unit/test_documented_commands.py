@@ -40,15 +40,15 @@ from documented import (
 )
 from snakemake.cli import get_argument_parser
 
-from filtercake import engine_choice
-from filtercake.calibration_config import Calibration, load_calibration
-from filtercake.cli import EXAMPLES as HELP_EXAMPLES
-from filtercake.cli import build_parser, main
-from filtercake.config_loading import load_study, load_workflow, read_yaml
-from filtercake.crystallizer import load_kinetics
+from filtercake.calibration.config import Calibration, load_calibration
+from filtercake.calibration.measurements import load_measurements
+from filtercake.cli.commands import EXAMPLES as HELP_EXAMPLES
+from filtercake.cli.commands import build_parser, main
+from filtercake.crystals.crystallizer import load_kinetics
 from filtercake.errors import ConfigError
-from filtercake.measurements import load_measurements
-from filtercake.study import expand
+from filtercake.study import engine_choice
+from filtercake.study.loading import load_study, load_workflow, read_yaml
+from filtercake.study.points import expand
 
 CLUSTER = "docs/cluster.md"
 CLUSTER_TEST = "tests/slurm/test_slurm.py::test_the_commands_of_the_page"

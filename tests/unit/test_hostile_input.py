@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from filtercake.calibration_config import load_calibration
-from filtercake.config import MOST_DISTRIBUTIONS, MOST_POINTS, Workflow
-from filtercake.config_loading import LoadedStudy, find_studies, load_study, load_workflow, parse
-from filtercake.crystallizer import load_kinetics
-from filtercake.csd import LARGEST_FILE, MOST_CLASSES, read_csd
+from filtercake.calibration.config import load_calibration
+from filtercake.calibration.measurements import load_measurements, read_test
+from filtercake.crystals.crystallizer import load_kinetics
+from filtercake.crystals.csd import LARGEST_FILE, MOST_CLASSES, read_csd
 from filtercake.errors import (
     MOST_SHOWN,
     ConfigError,
@@ -24,7 +23,8 @@ from filtercake.errors import (
     Problem,
     shown,
 )
-from filtercake.measurements import load_measurements, read_test
+from filtercake.study.config import MOST_DISTRIBUTIONS, MOST_POINTS, Workflow
+from filtercake.study.loading import LoadedStudy, find_studies, load_study, load_workflow, parse
 from filtercake.user_files import read_yaml
 
 READERS: dict[str, Callable[[Path], Any]] = {

@@ -82,8 +82,8 @@ def test_calibrate_says_what_to_give(checkout: Checkout) -> None:
 
 
 def test_both_engines_make_the_same_points() -> None:
-    from filtercake.config_loading import load_study
-    from filtercake.study import expand, with_engine
+    from filtercake.study.loading import load_study
+    from filtercake.study.points import expand, with_engine
 
     for path in sorted((REPOSITORY / "config" / "benchmarks").glob("agreement_*.yaml")):
         study = load_study(path)

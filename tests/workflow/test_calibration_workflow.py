@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 from checkouts import Checkout, copy_project
 
-from filtercake.calibration import Parameter
-from filtercake.calibration_config import load_calibration, settings_of
-from filtercake.calibration_study import conclude, summary
+from filtercake.calibration.config import load_calibration, settings_of
+from filtercake.calibration.fit import Parameter
+from filtercake.calibration.rounds import conclude, summary
 from filtercake.figures.calibrated import with_interval
 
 TINY = "config/test/calibration/tiny.yaml"

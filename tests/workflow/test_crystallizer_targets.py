@@ -7,7 +7,7 @@ STUDY = """
 crystallizer:
   kinetics: salt
   kinetics_file: own.yaml
-  slurry_density_kg_m3: 200
+  slurry_concentration_kg_m3: 200
 material: {}
 sweeps:
   - residence_time_min: [15, 30]
@@ -16,7 +16,7 @@ OWN = """
 salt:
   nucleation_coefficient: 1.0e+13
   units: "B0 #/(m3 s), MT kg/m3, G m/s"
-  slurry_density_exponent: 1
+  slurry_concentration_exponent: 1
   growth_rate_exponent: 1
   shape_factor: 0.5
   density_kg_m3: 2000

@@ -62,7 +62,7 @@ def test_a_killed_run_resumes_and_gives_the_tables_of_an_undisturbed_one(embedde
     complete = {path for path in finished if path.with_suffix(".json").exists()}
     assert len(complete) >= 3
     table = "results/resumed/summary.csv"
-    done = embedded.snakemake(table, "--config", f"studies={STUDY}", module="filtercake.resume")
+    done = embedded.snakemake(table, "--config", f"studies={STUDY}", module="filtercake.run.resume")
     assert done.returncode == 0, done.stderr
     assert all(path.stat().st_mtime_ns == finished[path] for path in complete)
     assert not list(results.rglob(".work")) and not list(results.rglob(".r*.npz.*"))

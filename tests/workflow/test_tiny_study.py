@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from filtercake.figures.catalogue import FIGURES
-from filtercake.study import REPLICATE_COLUMNS, SUMMARY_COLUMNS
+from filtercake.results.replicates import REPLICATE_COLUMNS, SUMMARY_COLUMNS
 
 AFTER_PACKING = {"replicates", "summary", "tables", "figure", "provenance"}
 

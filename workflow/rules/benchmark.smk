@@ -24,7 +24,7 @@ rule compare_engines:
         replicates=expand(
             "{results}/{study}/replicates.csv", results=RESULTS, study=AGREEMENT
         ),
-        library=library("agreement"),
+        library=library("validation.agreement"),
     output:
         table="{results}/benchmark/agreement.csv",
         replicates="{results}/benchmark/agreement_replicates.csv",
@@ -75,7 +75,7 @@ rule repeat_calibrations:
             results=RESULTS,
             study=["twin_truth", "twin_friction_truth"],
         ),
-        library=library("twin"),
+        library=library("validation.twin"),
     output:
         table="{results}/benchmark/twin.csv",
         repeats="{results}/benchmark/twin_repeats.csv",
@@ -126,7 +126,7 @@ rule bed_size:
 rule compare_sizes:
     input:
         replicates=bed_size_tables,
-        library=library("agreement"),
+        library=library("validation.agreement"),
     output:
         "{results}/benchmark/bed_size.csv",
     log:
@@ -184,7 +184,7 @@ rule speed:
 
 rule time_in_turn:
     input:
-        library=library("benchmark"),
+        library=library("validation.timing"),
         templates=sorted(
             str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
         ),
@@ -218,8 +218,8 @@ rule growth:
 
 rule time_growth:
     input:
-        library=library("growth"),
-        figure=library("figures.growth"),
+        library=library("validation.growth"),
+        figure=library("validation.figures.growth"),
     output:
         table="{results}/benchmark/growth.csv",
         png="{results}/benchmark/growth.png",
@@ -340,7 +340,7 @@ rule benchmark:
 rule time_variants:
     input:
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
-        library=library("accuracy"),
+        library=library("validation.error_against_time"),
         templates=sorted(
             str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
         ),
@@ -369,7 +369,7 @@ rule time_variants:
 
 rule choices:
     input:
-        library=library("accuracy"),
+        library=library("validation.error_against_time"),
     output:
         f"{BENCHMARK}/choices.csv",
     log:
@@ -396,7 +396,7 @@ rule choices:
 rule coverage:
     input:
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
-        library=library("accuracy"),
+        library=library("validation.error_against_time"),
     output:
         f"{BENCHMARK}/coverage.csv",
     log:
@@ -425,8 +425,8 @@ rule benchmark_page:
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
         choices=f"{BENCHMARK}/choices.csv",
         template=str(ROOT / "workflow" / "report" / "benchmark.md.j2"),
-        library=library("pages"),
-        figure=library("figures.run_time_error"),
+        library=library("validation.pages"),
+        figure=library("validation.figures.run_time_error"),
     output:
         table=f"{BENCHMARK}/run_time_error.csv",
         png=f"{BENCHMARK}/images/run_time_error.png",
@@ -459,7 +459,7 @@ rule stability:
 
 rule stress:
     input:
-        library=library("stability"),
+        library=library("validation.stability"),
         templates=sorted(
             str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
         ),
@@ -492,8 +492,8 @@ rule stability_page:
             family=stress_families(),
         ),
         template=str(ROOT / "workflow" / "report" / "stability.md.j2"),
-        library=library("pages"),
-        figure=library("figures.stability_maps"),
+        library=library("validation.pages"),
+        figure=library("validation.figures.stability_maps"),
     output:
         table=f"{BENCHMARK}/stability.csv",
         png=f"{BENCHMARK}/images/stability_maps.png",

@@ -18,7 +18,7 @@ checkpoint choose_round:
         manifests_of_rounds(rounds_before),
         rounds=rounds_before,
         csds=calibration_csds,
-        library=library("calibration_study"),
+        library=library("calibration.rounds"),
     output:
         "{results}/{calibration}/rounds/{number}.json",
     log:
@@ -45,7 +45,7 @@ checkpoint calibrate_cohesion:
         manifests_of_rounds(all_rounds),
         rounds=all_rounds,
         csds=calibration_csds,
-        library=library("calibration_study"),
+        library=library("calibration.rounds"),
     output:
         summary="{results}/{calibration}/calibration.json",
         tables=expand("{{results}}/{{calibration}}/tables/{table}.csv", table=TABLES),
@@ -75,8 +75,8 @@ rule predictions:
         summary="{results}/{calibration}/calibration.json",
         rounds=all_rounds,
         csds=calibration_csds,
-        library=library("calibration_study"),
-        tables=library("tables"),
+        library=library("calibration.rounds"),
+        tables=library("results.paper_tables"),
     output:
         "{results}/{calibration}/tables/predictions.csv",
     log:
@@ -104,7 +104,7 @@ rule predictions:
 rule measurement_fits:
     input:
         files=measurement_files,
-        library=library("measurements"),
+        library=library("calibration.measurements"),
     output:
         fits="{results}/{calibration}/tables/fits.csv",
         compressibility="{results}/{calibration}/tables/compressibility.csv",

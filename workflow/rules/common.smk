@@ -3,22 +3,23 @@
 import os
 import time
 
-from filtercake import console, engine_choice, estimate
-from filtercake.calibration_config import (
+from filtercake.calibration.config import (
     candidates as calibration_candidates,
     load_calibrations,
     settings_of,
 )
-from filtercake.config_loading import find_studies, load_studies
 from filtercake.figures import calibrated, catalogue
-from filtercake.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
 from filtercake.packing.result import read_record
-from filtercake.provenance import packing_sources, sources
-from filtercake.stability import families as stress_families
-from filtercake.study import expand as expand_points, with_engine
+from filtercake.run import console
+from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
+from filtercake.run.provenance import packing_sources, sources
+from filtercake.study import engine_choice, estimate
+from filtercake.study.loading import find_studies, load_studies
+from filtercake.study.points import expand as expand_points, with_engine
 from filtercake.units import MICROMETRE
+from filtercake.validation.stability import families as stress_families
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 

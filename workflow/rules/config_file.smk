@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from filtercake.config_loading import load_workflow
+from filtercake.study.loading import load_workflow
 from filtercake.errors import FiltercakeError
 from filtercake.user_files import read_yaml
 

@@ -4,7 +4,7 @@
 rule csd:
     input:
         file=csd_file,
-        library=library("crystallizer"),
+        library=library("crystals.crystallizer"),
     output:
         "{results}/{study}/csd/{csd}.csv",
     log:
@@ -28,7 +28,7 @@ rule csd:
 rule crystallizer:
     input:
         csds=csd_tables,
-        library=library("tables"),
+        library=library("results.paper_tables"),
     output:
         "{results}/{study}/tables/crystallizer.csv",
     log:

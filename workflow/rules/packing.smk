@@ -28,7 +28,7 @@ rule packing:
         spec=lambda wildcards: point_of(wildcards).spec.as_dict(),
         replicates=lambda wildcards: point_of(wildcards).replicates,
         most=lambda wildcards: point_of(wildcards).most_replicates,
-        interval=lambda wildcards: point_of(wildcards).porosity_interval,
+        interval=lambda wildcards: point_of(wildcards).porosity_ci95_target,
     message:
         "packing {wildcards.point}"
     script:

@@ -3,7 +3,7 @@
 
 rule points:
     input:
-        library=library("study"),
+        library=library("study.points"),
     output:
         "{results}/{study}/points.csv",
     log:
@@ -28,7 +28,7 @@ rule replicates:
     input:
         manifests=manifests,
         csds=csd_tables,
-        library=library("study"),
+        library=library("results.replicates"),
     output:
         "{results}/{study}/replicates.csv",
     log:
@@ -52,7 +52,7 @@ rule replicates:
 rule summary:
     input:
         replicates="{results}/{study}/replicates.csv",
-        library=library("study"),
+        library=library("results.replicates"),
     output:
         "{results}/{study}/summary.csv",
     log:
@@ -76,7 +76,7 @@ rule tables:
         summary="{results}/{study}/summary.csv",
         replicates="{results}/{study}/replicates.csv",
         csds=csd_tables,
-        library=library("tables"),
+        library=library("results.paper_tables"),
     output:
         table1="{results}/{study}/tables/table1.csv",
         table2="{results}/{study}/tables/table2.csv",
@@ -104,7 +104,7 @@ rule filter_design:
     input:
         summary="{results}/{study}/summary.csv",
         csds=csd_tables,
-        library=library("tables"),
+        library=library("results.filter_design"),
     output:
         "{results}/{study}/tables/filter.csv",
     log:

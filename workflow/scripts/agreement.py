@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.agreement import compare_engines
-from filtercake.job import job
 from filtercake.packing.result import publish
+from filtercake.run.job import job
+from filtercake.validation.agreement import compare_engines
 
 COLUMNS = ["study", "csd", "cohesion_kJ_m3", "friction", "engine", "replicate", "seed", "status", "reason"]
-COLUMNS += ["porosity", "porosity_as_published", "overlap_max", "coordination", "steps"]
+COLUMNS += ["porosity", "porosity_paper_count", "overlap_max", "coordination", "steps"]
 
 with job(snakemake.log[0], snakemake.output) as log:
     replicates = pd.concat([pd.read_csv(path) for path in snakemake.input.replicates], ignore_index=True)

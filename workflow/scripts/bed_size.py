@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.agreement import compare_sizes
-from filtercake.job import job
 from filtercake.packing.result import publish
+from filtercake.run.job import job
+from filtercake.validation.agreement import compare_sizes
 
 with job(snakemake.log[0], snakemake.output) as log:
     table = compare_sizes(*(pd.read_csv(path) for path in snakemake.input.replicates))

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake import pages
-from filtercake.accuracy import on_front
-from filtercake.figures import run_time_error
 from filtercake.figures.catalogue import save
 from filtercake.figures.style import applied
-from filtercake.job import job
 from filtercake.packing.result import publish
+from filtercake.run.job import job
+from filtercake.validation import pages
+from filtercake.validation.error_against_time import on_front
+from filtercake.validation.figures import run_time_error
 
 with job(snakemake.log[0], snakemake.output):
     table = pd.concat([pd.read_csv(file) for file in snakemake.input.errors], ignore_index=True)

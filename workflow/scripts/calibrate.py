@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from filtercake import calibration_study
-from filtercake.calibration_study import Task, conclude, prediction_points
-from filtercake.job import job
+from filtercake.calibration import rounds
+from filtercake.calibration.rounds import Task, conclude, prediction_points
 from filtercake.packing.result import publish, read_record, write_json
+from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output) as log:
     task = Task.from_params(snakemake.params.calibration)
@@ -15,12 +15,12 @@ with job(snakemake.log[0], snakemake.output) as log:
     outcome = conclude(task.settings, task.observations, simulated)
     for finding in outcome.findings:
         log.info("%s: %s", finding.kind, finding.text)
-    record = calibration_study.summary(outcome, task.settings, rounds[-1]["why"])
+    record = rounds.summary(outcome, task.settings, rounds[-1]["why"])
     record["prediction_points"] = list(prediction_points(task.settings, task.candidates, outcome.fit))
     tables = {
-        "parity": calibration_study.parity_table(outcome, task.settings, task.observations),
-        "objective": calibration_study.objective_table(outcome, task.settings),
-        "response": calibration_study.response_table(outcome, task.settings),
+        "parity": rounds.parity_table(outcome, task.settings, task.observations),
+        "objective": rounds.objective_table(outcome, task.settings),
+        "response": rounds.response_table(outcome, task.settings),
         "simulated": simulated,
     }
     for output in map(Path, snakemake.output.tables):

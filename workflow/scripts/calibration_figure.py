@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from filtercake.calibration.measurements import load_measurements
 from filtercake.figures.calibrated import CalibrationData, draw
 from filtercake.figures.catalogue import save
-from filtercake.job import job
-from filtercake.measurements import load_measurements
 from filtercake.packing.result import read_record
+from filtercake.run.job import job
 
 NAMES = {"csd": str, "point": str}
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.config import Study
+from filtercake.calibration.measurements import load_measurements
 from filtercake.figures.calibrated import CalibrationData
-from filtercake.job import job
-from filtercake.measurements import load_measurements
 from filtercake.packing.result import read_record
-from filtercake.provenance import describe
 from filtercake.report import captions, pages
+from filtercake.run.job import job
+from filtercake.run.provenance import describe
+from filtercake.study.config import Study
 
 NAMES = {"csd": str, "point": str}
 

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from filtercake import engine_choice
-from filtercake.accuracy import choice_table, choices, time_variants
-from filtercake.config_loading import load_study
-from filtercake.job import Progress, job
 from filtercake.packing.result import publish
-from filtercake.study import base_point
+from filtercake.run.job import Progress, job
+from filtercake.study import engine_choice
+from filtercake.study.loading import load_study
+from filtercake.study.points import base_point
+from filtercake.validation.error_against_time import choice_table, choices, time_variants
 
 with job(snakemake.log[0], snakemake.output) as log:
     study = load_study(Path(snakemake.params.study))

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from filtercake.calibration_study import Task, choose_round
-from filtercake.job import job
+from filtercake.calibration.rounds import Task, choose_round
 from filtercake.packing.result import read_record, write_json
+from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output) as log:
     task = Task.from_params(snakemake.params.calibration)

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake import engine_choice
-from filtercake.accuracy import coverage, reference_of
-from filtercake.config_loading import load_study
-from filtercake.job import Progress, job
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.result import publish
-from filtercake.study import base_point, with_engine
+from filtercake.run.job import Progress, job
+from filtercake.study import engine_choice
+from filtercake.study.loading import load_study
+from filtercake.study.points import base_point, with_engine
+from filtercake.validation.error_against_time import coverage, reference_of
 
 with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case

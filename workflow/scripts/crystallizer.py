@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.config import Study
-from filtercake.crystallizer import SteadyState
-from filtercake.csd import from_table
-from filtercake.job import job
+from filtercake.crystals.crystallizer import SteadyState
+from filtercake.crystals.csd import from_table
 from filtercake.packing.result import publish
-from filtercake.tables import crystallizer_table
+from filtercake.results.paper_tables import crystallizer_table
+from filtercake.run.job import job
+from filtercake.study.config import Study
 
 with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     study = Study.model_validate(snakemake.params.study)

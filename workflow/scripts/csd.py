@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from filtercake.crystallizer import crystal_size_distribution
-from filtercake.csd import mixture, read_csd, to_table, truncate
-from filtercake.job import job
+from filtercake.crystals.crystallizer import crystal_size_distribution
+from filtercake.crystals.csd import mixture, read_csd, to_table, truncate
 from filtercake.packing.result import publish
+from filtercake.run.job import job
 from filtercake.units import MICROMETRE
 
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from filtercake.job import job
 from filtercake.packing.result import publish
 from filtercake.report import markdown, pages
+from filtercake.run.job import job
 
 with job(snakemake.log[0]), publish(Path(snakemake.output[0])) as temporary:
     body = markdown.to_html(Path(snakemake.input.text).read_text(encoding="utf-8"))

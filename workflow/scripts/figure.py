@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from filtercake.figures.catalogue import StudyData, draw, save
-from filtercake.job import job
+from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output):
     data = StudyData.read(

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-from filtercake import engine_choice
-from filtercake.config_loading import load_study
-from filtercake.figures import growth as figure
 from filtercake.figures.catalogue import save
 from filtercake.figures.style import applied
-from filtercake.growth import Case, time_growth
-from filtercake.job import Progress, job
 from filtercake.packing.result import publish
-from filtercake.study import base_point
+from filtercake.run.job import Progress, job
+from filtercake.study import engine_choice
+from filtercake.study.loading import load_study
+from filtercake.study.points import base_point
+from filtercake.validation.figures import growth as figure
+from filtercake.validation.growth import Case, time_growth
 
 with job(snakemake.log[0], snakemake.output) as log:
     study = load_study(Path(snakemake.params.study))

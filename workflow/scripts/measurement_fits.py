@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from filtercake.job import job
-from filtercake.measurements import compressibility_table, fits_table, load_measurements
+from filtercake.calibration.measurements import compressibility_table, fits_table, load_measurements
 from filtercake.packing.result import publish
+from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output) as log:
     measurements = load_measurements(Path(snakemake.input.files[0]))

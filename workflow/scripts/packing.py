@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.csd import from_table
-from filtercake.job import Progress, job
+from filtercake.crystals.csd import from_table
 from filtercake.packing.pack import pack_replicates
-from filtercake.packing.spec import PackingSpec
-from filtercake.precision import UntilNarrow
-from filtercake.provenance import code_hash
+from filtercake.packing.replication import UntilNarrow
+from filtercake.packing.scene import PackingSpec
+from filtercake.run.job import Progress, job
+from filtercake.run.provenance import code_hash
 
 
 def main(table, sources, spec, asked, manifest, point, logger):

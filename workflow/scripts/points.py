@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from filtercake.job import job
 from filtercake.packing.result import publish
-from filtercake.study import Point, points_table
+from filtercake.run.job import job
+from filtercake.study.points import Point, points_table
 
 with job(snakemake.log[0], snakemake.output):
     table = points_table(Point.from_dict(values) for values in snakemake.params.points)

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from filtercake.calibration_study import Task, conclude, prediction_table
-from filtercake.config import Study
-from filtercake.job import job
+from filtercake.calibration.rounds import Task, conclude, prediction_table
 from filtercake.packing.result import publish, read_record
-from filtercake.tables import drum_of
+from filtercake.results.filter_design import drum_of
+from filtercake.run.job import job
+from filtercake.study.config import Study
 from filtercake.units import HOUR
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.job import job
 from filtercake.packing.result import write_json
-from filtercake.provenance import describe
+from filtercake.run.job import job
+from filtercake.run.provenance import describe
 
 with job(snakemake.log[0], snakemake.output):
     replicates = pd.read_csv(snakemake.input.replicates)

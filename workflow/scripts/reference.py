@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.accuracy import REFERENCE_COLUMNS
-from filtercake.job import job
 from filtercake.packing.result import publish
+from filtercake.run.job import job
+from filtercake.validation.error_against_time import REFERENCE_COLUMNS
 
 with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     tables = [pd.read_csv(file)[list(REFERENCE_COLUMNS)] for file in snakemake.input.replicates]

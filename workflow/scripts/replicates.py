@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.csd import from_table
-from filtercake.job import job
+from filtercake.crystals.csd import from_table
 from filtercake.packing.result import publish
-from filtercake.study import Point, replicates_table
+from filtercake.results.replicates import replicates_table
+from filtercake.run.job import job
+from filtercake.study.points import Point
 
 
 def main(points, packings, csd_tables, sphericity, output):

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake import engine_choice
-from filtercake.accuracy import errors, reference_of, time_peers, time_variants, variants
-from filtercake.config_loading import load_study
-from filtercake.job import Progress, job
 from filtercake.packing.result import publish
-from filtercake.study import base_point
+from filtercake.run.job import Progress, job
+from filtercake.study import engine_choice
+from filtercake.study.loading import load_study
+from filtercake.study.points import base_point
+from filtercake.validation.error_against_time import errors, reference_of, time_peers, time_variants, variants
 
 with job(snakemake.log[0], snakemake.output) as log:
     case, name = snakemake.params.case, snakemake.wildcards.case

@@ -3,13 +3,13 @@
 from dataclasses import replace
 from pathlib import Path
 
-from filtercake import engine_choice
-from filtercake.benchmark import compare, contender, time_in_turn
-from filtercake.config_loading import load_study
-from filtercake.job import Progress, job
 from filtercake.packing.result import publish
-from filtercake.study import base_point
+from filtercake.run.job import Progress, job
+from filtercake.study import engine_choice
+from filtercake.study.loading import load_study
+from filtercake.study.points import base_point
 from filtercake.units import MICROMETRE, MICROSECOND
+from filtercake.validation.timing import compare, contender, time_in_turn
 
 with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case

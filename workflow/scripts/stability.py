@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from filtercake.job import Progress, job
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.result import publish
-from filtercake.stability import cases, run
+from filtercake.run.job import Progress, job
+from filtercake.validation.stability import cases, run
 
 with job(snakemake.log[0], snakemake.output) as log:
     runnable = [name for name, engine in ENGINES.items() if engine().why_missing() is None]

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake import pages
-from filtercake.figures import stability_maps
 from filtercake.figures.catalogue import save
 from filtercake.figures.style import applied
-from filtercake.job import job
 from filtercake.packing.result import publish
-from filtercake.stability import with_fence
+from filtercake.run.job import job
+from filtercake.validation import pages
+from filtercake.validation.figures import stability_maps
+from filtercake.validation.stability import with_fence
 
 with job(snakemake.log[0], snakemake.output):
     table = with_fence(pd.concat([pd.read_csv(file) for file in snakemake.input.tables], ignore_index=True))

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from filtercake.figures.catalogue import StudyData
-from filtercake.job import job
 from filtercake.packing.result import read_record
 from filtercake.report import captions, pages
+from filtercake.run.job import job
 
 with job(snakemake.log[0]):
     folder = Path(snakemake.input.summary).parent

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.job import job
 from filtercake.packing.result import publish
-from filtercake.study import summarise
+from filtercake.results.replicates import summarise
+from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     summarise(pd.read_csv(snakemake.input.replicates)).to_csv(temporary, index=False)

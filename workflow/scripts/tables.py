@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.config import Study
-from filtercake.csd import from_table
-from filtercake.job import job
+from filtercake.crystals.csd import from_table
 from filtercake.packing.result import publish
-from filtercake.tables import comparison, table1, table2, table4
+from filtercake.results.paper_tables import comparison, table1, table2, table4
+from filtercake.run.job import job
+from filtercake.study.config import Study
 
 with job(snakemake.log[0], snakemake.output):
     study = Study.model_validate(snakemake.params.study)

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.job import job
 from filtercake.packing.result import publish
-from filtercake.twin import repeat_calibrations, summarise
+from filtercake.run.job import job
+from filtercake.validation.twin import repeat_calibrations, summarise
 
 with job(snakemake.log[0], snakemake.output) as log:
     pool, truth = (

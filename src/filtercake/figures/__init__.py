@@ -1,1 +1,4 @@
-"""Figures: one module per family, each taking a study's tables and returning a matplotlib Figure."""
+"""One module per family of figures: each takes tables and returns a matplotlib figure.
+
+Imports from calibration, results and the rooms below them; the catalogues say which figures a study has.
+"""

@@ -16,16 +16,16 @@ import numpy as np
 import pandas as pd
 from scipy import special
 
-from filtercake.calibration import CONFIDENCE
-from filtercake.measurements import Measurements, compressibility_by_csd
-from filtercake.precision import half_width
+from filtercake.calibration.fit import CONFIDENCE
+from filtercake.calibration.measurements import Measurements, compressibility_by_csd
+from filtercake.packing.replication import half_width
 
 if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
     from matplotlib.figure import Figure
 
 Z = float(special.ndtri(0.5 + 0.5 * CONFIDENCE))
 """Standard errors from an estimate to the end of its 95 % interval."""
-ESTIMATORS = {"interior": "interior porosity", "as_published": "porosity counted as in the paper"}
+ESTIMATORS = {"interior": "interior porosity", "paper_count": "porosity counted as in the paper"}
 """Names of estimators for readers; one that is not listed keeps its own."""
 
 
@@ -38,11 +38,11 @@ class CalibrationData:
     name, title : str
         The calibration, and one line about it.
     summary : dict
-        The outcome (see :func:`filtercake.calibration_study.summary`).
+        The outcome (see :func:`filtercake.calibration.rounds.summary`).
     parity, objective, response : DataFrame
-        Its tables (see :mod:`filtercake.calibration_study`).
+        Its tables (see :mod:`filtercake.calibration.rounds`).
     simulated : DataFrame
-        Every packing made (see :func:`filtercake.calibration_study.simulate`).
+        Every packing made (see :func:`filtercake.calibration.rounds.simulate`).
     predictions : DataFrame or None
         Predicted resistances, where any were asked for.
     labels : dict of str to str

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from scipy import special
 
-from filtercake.calibration import CONFIDENCE
+from filtercake.calibration.fit import CONFIDENCE
 from filtercake.figures import calibrated, style
 from filtercake.units import FloatArray
 

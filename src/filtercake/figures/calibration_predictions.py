@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from filtercake.calibration_study import SAFETY_FACTOR
+from filtercake.calibration.rounds import SAFETY_FACTOR
 from filtercake.figures import calibrated, style
 from filtercake.figures.calibration_parity import resistance_abscissa
 

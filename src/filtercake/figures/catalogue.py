@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from filtercake.config import Study
-from filtercake.csd import CrystalSizeDistribution, from_table
+from filtercake.crystals.csd import CrystalSizeDistribution, from_table
 from filtercake.packing.result import publish
-from filtercake.study import Point
+from filtercake.study.config import Study
+from filtercake.study.points import Point
 
 if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
     from matplotlib.figure import Figure
@@ -37,13 +37,14 @@ class StudyData:
     study : Study
         Its model (labels, published values, material).
     points, summary, replicates : DataFrame
-        Its tables (see :mod:`filtercake.study`).
+        Its tables (see :mod:`filtercake.study.points`).
     csds : dict of str to (CrystalSizeDistribution, CrystalSizeDistribution)
         Full and truncated distribution by name.
     packings : Path
         Folder with one folder of packings per point.
     crystallizer : DataFrame
-        The table of the crystallizer's states (see :func:`filtercake.tables.crystallizer_table`); empty without one.
+        The table of the crystallizer's states (:func:`filtercake.results.paper_tables.crystallizer_table`); empty
+        without one.
     """
 
     name: str

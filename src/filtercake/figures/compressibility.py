@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from scipy import special
 
+from filtercake.calibration.measurements import Measurement, Measurements, compressibility_by_csd, with_pressure
 from filtercake.figures import style
-from filtercake.filtration import CompressibilityFit
-from filtercake.measurements import Measurement, Measurements, compressibility_by_csd, with_pressure
+from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.units import KILOPASCAL
 
 BEYOND = 1.12

@@ -55,6 +55,6 @@ def _notes(data: StudyData) -> list[str]:
     if crystallizer is None:
         return []
     return [
-        f"kinetics: {crystallizer.kinetics}, {crystallizer.slurry_density_kg_m3:g} kg/m³ of crystals",
+        f"kinetics: {crystallizer.kinetics}, {crystallizer.slurry_concentration_kg_m3:g} kg/m³ of crystals",
         f"{crystallizer.slurry_flow_m3_h:g} m³/h of slurry; no packing enters",
     ]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from filtercake.crystallizer import volume_density
+from filtercake.crystals.crystallizer import volume_density
 from filtercake.figures import selection, style
 from filtercake.units import MICROMETRE, MINUTE
 

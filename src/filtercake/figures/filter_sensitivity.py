@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from filtercake.drum_filter import DrumFilter, medium_share, resistance_for_cake_share
-from filtercake.drum_filter import area as filter_area
 from filtercake.figures import style
 from filtercake.figures.filter_area import VOLUME, operating_point, published
 from filtercake.figures.filtered import filtered
-from filtercake.tables import drum_of
+from filtercake.filtration.drum_filter import DrumFilter, medium_share, resistance_for_cake_share
+from filtercake.filtration.drum_filter import area as filter_area
+from filtercake.results.filter_design import drum_of
 from filtercake.units import HOUR, KILOPASCAL, FloatArray
 
 if TYPE_CHECKING:

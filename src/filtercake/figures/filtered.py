@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from filtercake.figures import selection
-from filtercake.tables import filter_design
+from filtercake.results.filter_design import filter_design
 
 if TYPE_CHECKING:
     from filtercake.figures.catalogue import StudyData

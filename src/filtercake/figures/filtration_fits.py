@@ -10,9 +10,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from filtercake.calibration.measurements import VOLUME_UNITS, BothForms, Measurements
 from filtercake.figures import style
-from filtercake.filtration import BoolArray, FiltrationFit, FiltrationTest, disagreement
-from filtercake.measurements import VOLUME_UNITS, BothForms, Measurements
+from filtercake.filtration.constant_pressure import BoolArray, FiltrationFit, FiltrationTest, disagreement
 from filtercake.units import KILOPASCAL
 
 MOST_PANELS = 24

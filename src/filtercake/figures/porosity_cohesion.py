@@ -51,12 +51,12 @@ def _panel(axes: Axes, data: StudyData, csd: str, rows: pd.DataFrame, frictions:
         style.error_line(axes, line, *columns, label=label, index=index, place=index, count=len(frictions))
         counted = axes.plot(
             line["cohesion_kJ_m3"],
-            line["porosity_as_published"],
+            line["porosity_paper_count"],
             style.marker(index),
             markerfacecolor="none",
             markeredgecolor=style.colour(index),
             alpha=0.45,
-            gid="as_published",
+            gid="paper_count",
         )
         style.shift(counted, axes, index, len(frictions))
     if rows["porosity"].isna().all():

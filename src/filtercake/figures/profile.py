@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.packing.porosity import porosity_profile
+from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import bed_height, interior_slab
-from filtercake.porosity import porosity_profile
-from filtercake.precision import half_width
 from filtercake.units import MICROMETRE, FloatArray
 
 if TYPE_CHECKING:

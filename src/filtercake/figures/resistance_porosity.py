@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from filtercake.config import Published
 from filtercake.figures import selection, style
-from filtercake.resistance import kozeny_carman
+from filtercake.filtration.resistance import kozeny_carman
+from filtercake.study.config import Published
 
 if TYPE_CHECKING:
     from filtercake.figures.catalogue import StudyData

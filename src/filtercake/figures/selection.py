@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from filtercake.config import Published
-from filtercake.crystallizer import SteadyState
+from filtercake.crystals.crystallizer import SteadyState
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
-from filtercake.study import base_rows
+from filtercake.study.config import Published
+from filtercake.study.points import base_rows
 from filtercake.units import LITRE, MICROMETRE, MINUTE
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def products(data: StudyData) -> list[tuple[str, float, SteadyState]]:
                 nucleation_rate=float(row["nucleation_rate_1_L_s"]) / LITRE,
                 size_scale=float(row["size_scale_um"]) * MICROMETRE,
                 residence_time=float(row["residence_time_min"]) * MINUTE,
-                slurry_density=float(row["slurry_density_kg_m3"]),
+                slurry_concentration=float(row["slurry_concentration_kg_m3"]),
                 kinetics=str(row["kinetics"]),
             ),
         )

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
-from filtercake.study import base_rows
+from filtercake.study.points import base_rows
 
 if TYPE_CHECKING:
     from filtercake.figures.catalogue import StudyData

@@ -13,8 +13,8 @@ from filtercake.figures import selection, style
 from filtercake.units import MICROMETRE, FloatArray
 
 if TYPE_CHECKING:
-    from filtercake.config import Csd
     from filtercake.figures.catalogue import StudyData
+    from filtercake.study.config import Csd
 
 MOST_PANELS = 4
 KEPT, DISCARDED = style.colour(0), style.colour(1)

@@ -1,1 +1,4 @@
-"""From a crystal size distribution to an accepted packing: cloud, settling, acceptance, and the engines."""
+"""One packing: the scene that decides it, its cloud, the engines that settle it, and what makes it acceptable.
+
+Porosity is measured here, too. Imports only from crystals and the ground.
+"""

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from filtercake import contact
 from filtercake.errors import PackingRejected
+from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.contacts import Contacts, find_contacts, floor_overlap, relative_overlap
 from filtercake.packing.result import SettledState
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import ENERGY_FRACTION, StopRule, stopped_falling
 from filtercake.packing.slab import bed_height, interior_slab, why_too_thin
-from filtercake.packing.spec import PackingSpec
 from filtercake.units import GRAVITY, FloatArray
 
 OVERLAP_FACTOR = 1.5
@@ -33,9 +33,9 @@ STEADY_ENERGY = 0.8
 
 def overlap_limit(spec: PackingSpec, radius: FloatArray) -> float:
     """Largest overlap of an acceptable packing of spheres (radii in m) over the diameter of the smaller sphere."""
-    equal = contact.relative_overlap(spec.cohesion, spec.youngs_modulus, spec.poisson_ratio)
+    equal = contact_law.relative_overlap(spec.cohesion, spec.youngs_modulus, spec.poisson_ratio)
     smallest, largest = float(radius.min()), float(radius.max())
-    modulus = contact.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
+    modulus = contact_law.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
     weight = spec.density * 4.0 / 3.0 * np.pi * largest**3 * GRAVITY
     pressed = (weight / (4.0 / 3.0 * modulus * np.sqrt(smallest))) ** (2.0 / 3.0) / (2.0 * smallest)
     return float(OVERLAP_FACTOR * 2.0 * equal + OVERLAP_ALLOWANCE + LOAD_FACTOR * pressed)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError
 from filtercake.units import MICROMETRE, FloatArray, IntArray
 
@@ -73,7 +73,9 @@ class Cloud:
         return 1.0 - solids / (self.length**2 * self.height)
 
 
-def box_length(csd: CrystalSizeDistribution, particles: int, void_fraction: float, column_ratio: float = 1.0) -> float:
+def box_length(
+    csd: CrystalSizeDistribution, particles: int, void_fraction: float, bed_depth_factor: float = 1.0
+) -> float:
     """System dimension L, m: ``(N <V> / ((1 - e0) 2 c))^(1/3)`` (paper, Table 1, with c = 1).
 
     Parameters
@@ -84,11 +86,11 @@ def box_length(csd: CrystalSizeDistribution, particles: int, void_fraction: floa
         Number of spheres N.
     void_fraction : float
         Initial void fraction e0 of the region 0..2cL.
-    column_ratio : float
+    bed_depth_factor : float
         How many times deeper than the paper's the bed is, in units of its box side: c.
     """
     solids = particles * csd.mean_particle_volume
-    return float((solids / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * column_ratio)) ** (1.0 / 3.0))
+    return float((solids / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * bed_depth_factor)) ** (1.0 / 3.0))
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ class BedSize:
     """How large a bed of a distribution has to be."""
 
     particles: int
-    column_ratio: float
+    bed_depth_factor: float
 
 
 def bed_for(csd: CrystalSizeDistribution, void_fraction: float) -> BedSize:
@@ -116,12 +118,12 @@ def bed_for(csd: CrystalSizeDistribution, void_fraction: float) -> BedSize:
         return BedSize(NARROW_PARTICLES, 1.0)
     width, depth = WIDTH_DIAMETERS * csd.largest, DEPTH_DIAMETERS * csd.largest
     solids = width**2 * depth * (1.0 - SETTLED_POROSITY)
-    column_ratio = depth * (1.0 - SETTLED_POROSITY) / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * width)
-    return BedSize(max(NARROW_PARTICLES, math.ceil(solids / csd.mean_particle_volume)), round(column_ratio, 3))
+    bed_depth_factor = depth * (1.0 - SETTLED_POROSITY) / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * width)
+    return BedSize(max(NARROW_PARTICLES, math.ceil(solids / csd.mean_particle_volume)), round(bed_depth_factor, 3))
 
 
 def make_cloud(
-    csd: CrystalSizeDistribution, particles: int, void_fraction: float, seed: int, column_ratio: float = 1.0
+    csd: CrystalSizeDistribution, particles: int, void_fraction: float, seed: int, bed_depth_factor: float = 1.0
 ) -> Cloud:
     """Place N spheres by random sequential addition, large ones first, with exact class counts.
 
@@ -135,7 +137,7 @@ def make_cloud(
         Initial void fraction of the region 0..2cL; 0.65, or 0.60 for broad distributions.
     seed : int
         Seed of the random stream; the same seed gives the same cloud on every machine.
-    column_ratio : float
+    bed_depth_factor : float
         c, as in :func:`box_length`.
 
     Raises
@@ -147,13 +149,13 @@ def make_cloud(
         raise CloudError("the cloud holds no sphere; particles must be at least 1")
     counts = csd.class_counts(particles)
     radius = np.repeat(0.5 * csd.size[::-1], counts[::-1])
-    length = box_length(csd, particles, void_fraction, column_ratio)
+    length = box_length(csd, particles, void_fraction, bed_depth_factor)
     if 2.0 * radius[0] > length:
         raise CloudError(
             f"the largest sphere ({2.0 * radius[0] / MICROMETRE:.4g} um) is wider than the periodic box "
             f"({length / MICROMETRE:.4g} um); use more particles than {particles}"
         )
-    height = PLACEMENT_HEIGHT * column_ratio * length
+    height = PLACEMENT_HEIGHT * bed_depth_factor * length
     position = np.empty((particles, 3))
     rng = np.random.Generator(np.random.PCG64(seed))
     level, cells = _grid_levels(radius, length, height)

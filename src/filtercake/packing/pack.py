@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
 from filtercake.packing.cloud import Cloud, make_cloud
 from filtercake.packing.engines import Engine, SettleRequest, get_engine
 from filtercake.packing.result import Packing, SettledState, read_sealed, sealed, sha256, write_json
+from filtercake.packing.scene import PackingSpec, digest, stage_seed
 from filtercake.packing.settling import StopRule
-from filtercake.packing.spec import PackingSpec, digest, stage_seed
 
 ATTEMPTS = 3
 """Times a packing is tried when it fails for a reason that may pass (killed, output cut short)."""
@@ -65,7 +65,7 @@ def cloud_seed(spec: PackingSpec, csd: CrystalSizeDistribution, replicate: int) 
     make the differences between those sharp.
     """
     classes = [[f"{size:.12e}" for size in csd.size], [f"{x:.12e}" for x in csd.volume_fraction]]
-    return stage_seed(spec.seed, classes, spec.particles, spec.void_fraction, replicate, "cloud")
+    return stage_seed(spec.seed, classes, spec.particles, spec.initial_void_fraction, replicate, "cloud")
 
 
 def pack(
@@ -154,7 +154,7 @@ def settle(
         If the spheres cannot be placed, or the engine fails.
     """
     seed = cloud_seed(spec, csd, replicate)
-    cloud = make_cloud(csd, spec.particles, spec.void_fraction, seed, spec.column_ratio)
+    cloud = make_cloud(csd, spec.particles, spec.initial_void_fraction, seed, spec.bed_depth_factor)
     rule = StopRule.for_bed(spec, cloud.length)
     request = SettleRequest(spec, csd, cloud, rule, stage_seed(seed, "engine"), folder, progress, state_file)
     return Settled((engine or get_engine(spec.engine)).settle(request), cloud, rule, seed)

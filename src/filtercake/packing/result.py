@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from filtercake.errors import PackingRejected
+from filtercake.packing.scene import digest
 from filtercake.packing.settling import Trajectory
-from filtercake.packing.spec import digest
 from filtercake.units import FloatArray
 
 TEMPORARY = re.compile(r"\..+\.[a-z0-9_]{8}")

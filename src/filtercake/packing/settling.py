@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from filtercake.packing.cloud import PLACEMENT_HEIGHT
-from filtercake.packing.spec import PackingSpec
+from filtercake.packing.scene import PackingSpec
 from filtercake.units import FloatArray
 
 CHECKS_PER_FALL = 40
@@ -75,7 +75,7 @@ class StopRule:
     @classmethod
     def for_bed(cls, spec: PackingSpec, length: float) -> StopRule:
         """Scale the rule to a box of side ``length`` (m)."""
-        fall_time = spec.free_fall_time(PLACEMENT_HEIGHT * spec.column_ratio * length)
+        fall_time = spec.free_fall_time(PLACEMENT_HEIGHT * spec.bed_depth_factor * length)
         check_steps = max(1, round(fall_time / CHECKS_PER_FALL / spec.time_step))
         return cls(
             check_steps=check_steps,

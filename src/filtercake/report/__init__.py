@@ -1,1 +1,4 @@
-"""What the report shows beside the figures: captions, readable tables, pages of prose."""
+"""The report: captions, pages and words around a study's figures and tables.
+
+Imports from figures and the rooms below it.
+"""

@@ -9,7 +9,6 @@ from typing import Any
 import pandas as pd
 from PIL import Image
 
-from filtercake.config import SWEPT
 from filtercake.figures import calibrated, selection
 from filtercake.figures.calibrated import CalibrationData
 from filtercake.figures.catalogue import FOOTER, StudyData
@@ -18,6 +17,7 @@ from filtercake.figures.porosity_cohesion import FREE
 from filtercake.packing.result import publish
 from filtercake.report.pages import engine_names, environment
 from filtercake.report.words import heading, number, with_interval
+from filtercake.study.config import SWEPT
 
 SUFFIX, FRONT = ".html.j2", "front"
 

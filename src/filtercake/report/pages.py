@@ -11,11 +11,11 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from filtercake.config import Study
 from filtercake.figures import style
 from filtercake.packing.result import publish
 from filtercake.report import words
 from filtercake.report.catalogue import PAGES
+from filtercake.study.config import Study
 
 FAILED_COLUMNS = ("point", "replicate", "csd", "cohesion_kJ_m3", "friction", "engine", "reason")
 

@@ -36,7 +36,7 @@ NAMES = {
     "sd": "standard deviation of one packing",
     "deviation_sd": "distance in standard deviations",
     "porosity": "porosity of the interior",
-    "porosity_as_published": "porosity as the paper counts",
+    "porosity_paper_count": "porosity as the paper counts",
     "resistance_sauter": "resistance by Carman's form",
     "resistance_truncated": "resistance of the packed classes alone",
     "overlap_max": "largest overlap over diameter",

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from filtercake.csd import CrystalSizeDistribution
+from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.result import SettledState
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import StopRule
-from filtercake.packing.spec import PackingSpec
 
 Progress = Callable[[str], None]
 """Takes one short line about how far a long packing is."""

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from filtercake import contact
 from filtercake.errors import EngineError
+from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import embedded_kernels as kernels
-from filtercake.packing.spec import PackingSpec
+from filtercake.packing.scene import PackingSpec
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
 SKIN_DIAMETERS = (0.08, 1.5)
@@ -135,9 +135,9 @@ class Bed:
 
     def _set_material(self) -> None:
         spec = self.spec
-        self.modulus = contact.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
-        shear = contact.shear_modulus(spec.youngs_modulus, spec.poisson_ratio) / (2.0 * (2.0 - spec.poisson_ratio))
-        self.damping_ratio = contact.damping_ratio(spec.restitution)
+        self.modulus = contact_law.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
+        shear = contact_law.shear_modulus(spec.youngs_modulus, spec.poisson_ratio) / (2.0 * (2.0 - spec.poisson_ratio))
+        self.damping_ratio = contact_law.damping_ratio(spec.restitution)
         self.law = kernels.Law(
             float(self.gravity),
             float(spec.cohesion),

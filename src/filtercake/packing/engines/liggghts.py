@@ -19,8 +19,8 @@ from filtercake.packing.engines.base import SettleRequest, parallelism
 from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
 from filtercake.packing.engines.micro import UnitSystem
 from filtercake.packing.result import SettledState
+from filtercake.packing.scene import PackingSpec
 from filtercake.packing.settling import WINDOW, Trajectory
-from filtercake.packing.spec import PackingSpec
 from filtercake.units import GRAVITY, FloatArray
 
 EXECUTABLE_VARIABLE = "FILTERCAKE_LIGGGHTS"

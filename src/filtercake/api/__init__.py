@@ -1,0 +1,42 @@
+"""The steps of a study as functions: the one import that a notebook needs.
+
+``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`porosity`, :func:`profile`,
+:func:`resistance`, :func:`filter_area`, :func:`export` and :func:`rerun`. It may import from every room but ``cli``,
+``report`` and ``validation``.
+"""
+
+from filtercake.api.export import Exported, export, first_porosity, rerun
+from filtercake.api.pack import Bed, pack
+from filtercake.api.steps import (
+    Distribution,
+    FilterOptions,
+    FilterSize,
+    PackingPorosity,
+    Resistance,
+    ResistanceOptions,
+    distribution,
+    filter_area,
+    porosity,
+    profile,
+    resistance,
+)
+
+__all__ = [
+    "Bed",
+    "Distribution",
+    "Exported",
+    "FilterOptions",
+    "FilterSize",
+    "PackingPorosity",
+    "Resistance",
+    "ResistanceOptions",
+    "distribution",
+    "export",
+    "filter_area",
+    "first_porosity",
+    "pack",
+    "porosity",
+    "profile",
+    "rerun",
+    "resistance",
+]

@@ -1,0 +1,153 @@
+"""Packings of one distribution without Snakemake: pack, measure, average."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
+from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
+from filtercake.errors import ConfigError, Problem
+from filtercake.packing.engines.liggghts import template_folder
+from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates
+from filtercake.packing.replication import UntilNarrow
+from filtercake.packing.result import Packing as SettledPacking
+from filtercake.packing.result import write_json
+from filtercake.results.replicates import REPLICATE_COLUMNS, failed_row, replicate_row, summarise
+from filtercake.run.provenance import code_hash, packing_sources, versions
+from filtercake.study import engine_choice
+from filtercake.study.config import Material
+from filtercake.study.points import Point, base_point
+from filtercake.units import MICROSECOND
+
+SUMMARY = "summary.json"
+_OWN = re.compile(rf"r\d+\..*|\.r\d+\..*|\.work|{re.escape(MANIFEST)}|{re.escape(SUMMARY)}")
+"""Names that packings and their records have."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Packings of one distribution, measured.
+
+    Attributes
+    ----------
+    summary : dict
+        Means, 95 % half-widths, counts: the columns of ``summary.csv`` (docs: config/README.md); None where there is
+        no value.
+    replicates : DataFrame
+        One row per packing: the columns of ``replicates.csv``.
+    files : tuple of Path
+        The accepted packings.
+    failures : tuple of str
+        Why others were not.
+    warnings : tuple of str
+        What is allowed but doubtful about the arguments.
+    """
+
+    summary: dict[str, Any]
+    replicates: pd.DataFrame
+    files: tuple[Path, ...]
+    failures: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None, **options: Any) -> Bed:
+    """Pack spheres of a size distribution, and measure porosity and resistance.
+
+    Packings that ``folder`` holds of the same arguments are kept, so that more of them, or a narrower interval, may be
+    asked for later.
+
+    Parameters
+    ----------
+    source : Distribution
+        The size distribution.
+    folder : str or Path
+        Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
+    say : callable
+        Takes a line about each packing as it comes.
+    **options
+        The keys of the configuration's blocks ``material`` and ``packing``.
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+    EngineMissing
+        If the engine asked for is not installed.
+    """
+    material = {name: value for name, value in options.items() if name in Material.model_fields}
+    packing = {name: value for name, value in options.items() if name not in material}
+    study = load(source.options, material, packing)
+    path, name = Path(folder), csd_name(study)
+    _check_folder(path)
+    point = base_point(study, name, engine_choice.choose)
+    csd = study.csds[name]
+    # a resistance beyond floating point is found before the packings are made, not after
+    resistance(source, porosity=0.01, density_kg_m3=point.spec.density, sphericity=study.model.material.sphericity)
+    outcomes = _make(point, csd.truncated, path, say)
+    sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
+    rows = [_row(point, outcome, path, sizes, sphericity) for outcome in outcomes]
+    table = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
+    summary = _summary(table, point)
+    write_json(path / SUMMARY, {**summary, "versions": versions()})
+    return Bed(
+        summary=summary,
+        replicates=table,
+        files=tuple(path / f"r{outcome.replicate}.npz" for outcome in outcomes if outcome.status == "ok"),
+        failures=tuple(f"r{outcome.replicate}: {outcome.reason}" for outcome in outcomes if outcome.status != "ok"),
+        warnings=study.warnings,
+    )
+
+
+def code_of(engine: str) -> str:
+    """Hash of the code and the decks behind packings by an engine."""
+    return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
+
+
+def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Say) -> list[Outcome]:
+    def report(outcome: Outcome, record: dict[str, Any]) -> None:
+        if outcome.status == "ok":
+            say(f"r{outcome.replicate}: {record['steps']:,} steps, {record['wall_s']:.1f} s")
+        else:
+            say(f"r{outcome.replicate} failed: {outcome.reason}")
+
+    interval, code = point.porosity_ci95_target, code_of(point.spec.engine)
+    enough: Callable[[Path], bool] = lambda _: False  # noqa: E731 - the other branch is an object
+    if interval is not None:
+        enough = UntilNarrow(point.spec, interval, point.replicates)
+    return pack_replicates(point.spec, csd, point.most_replicates, folder, code, report, say, enough)
+
+
+def _row(point: Point, outcome: Outcome, folder: Path, sizes: FullAndTruncated, sphericity: float) -> dict[str, Any]:
+    if outcome.status != "ok":
+        return failed_row(point, outcome, outcome.reason)
+    return replicate_row(point, SettledPacking.load(folder / f"r{outcome.replicate}.npz"), sizes, sphericity)
+
+
+def _summary(table: pd.DataFrame, point: Point) -> dict[str, Any]:
+    """Averages and what was packed, as plain values."""
+    row = summarise(table).iloc[0].drop(["point", "study", "csd"]).to_dict()
+    plain = {name: value.item() if hasattr(value, "item") else value for name, value in row.items()}
+    for name, value in plain.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            plain[name] = None
+    bed = {"particles": point.spec.particles, "bed_depth_factor": point.spec.bed_depth_factor, "seed": point.spec.seed}
+    return {**plain, **bed, "density_kg_m3": point.spec.density, "time_step_us": point.spec.time_step / MICROSECOND}
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder with other files: packings replace those of the same name, and tidy up around them."""
+    if not folder.exists():
+        return
+    foreign = sorted(path.name for path in folder.iterdir() if not _OWN.fullmatch(path.name))
+    if foreign:
+        allowed = f"must be new, empty, or a folder of packings; it holds {foreign[0]}"
+        raise ConfigError([Problem(str(ORIGIN), "output", str(folder), allowed)])

@@ -1,0 +1,490 @@
+"""The library for scripts and notebooks: the steps of a study, one function each, without Snakemake.
+
+Arguments have the names, units, defaults and ranges of the configuration (docs/config-reference.md) and are checked the
+same way; results have the names of the columns of ``summary.csv``. Examples are in docs/api.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, model_validator
+
+from filtercake.crystals.crystallizer import SteadyState
+from filtercake.crystals.csd import CrystalSizeDistribution
+from filtercake.errors import ConfigError, FilterError, PackingRejected, Problem
+from filtercake.filtration.drum_filter import (
+    DrumFilter,
+    area,
+    cake_mass_per_area,
+    cake_thickness,
+    capacity,
+    medium_share,
+)
+from filtercake.filtration.resistance import carman_sauter, kozeny_carman, log_sensitivity
+from filtercake.packing.cloud import NARROW_PARTICLES
+from filtercake.packing.porosity import measure, porosity_profile
+from filtercake.packing.result import Packing
+from filtercake.packing.scene import PackingSpec
+from filtercake.packing.slab import bed_height
+from filtercake.study.config import TO_NUMBER, Density, Filter, Model
+from filtercake.study.loading import LoadedStudy, check_study, parse
+from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
+
+ORIGIN = Path("options")
+"""Stands for the study file in messages about arguments; files that arguments name are looked up from here."""
+CSD = "csd"
+"""Name of the one distribution."""
+CRYSTALLIZER_OPTIONS = ("kinetics", "kinetics_file", "slurry_concentration_kg_m3", "bin_width_um")
+PLAIN_DENSITY = 1000.0
+"""Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it, or from the spheres
+that a bed of it needs."""
+SLICES_PER_DIAMETER = 20
+LARGEST_RESISTANCE = 1e100
+"""m/kg; beyond, squares leave floating point."""
+OUT_OF_REACH = "a number is too small or too large to compute with"
+MILLIMETRE = 1e-3
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A crystal size distribution, whole and as it is packed.
+
+    Attributes
+    ----------
+    full, truncated : CrystalSizeDistribution
+        The whole distribution, which the resistance needs, and the one that is packed.
+    density_kg_m3 : float or None
+        Crystal density, kg/m3, where a crystallizer's kinetics say it.
+    crystallizer : SteadyState or None
+        The crystallizer that makes it.
+    options : dict
+        The arguments it was made from.
+    """
+
+    full: CrystalSizeDistribution
+    truncated: CrystalSizeDistribution
+    density_kg_m3: float | None
+    crystallizer: SteadyState | None
+    options: dict[str, Any]
+
+    @property
+    def kept_volume_fraction(self) -> float:
+        """Share of the crystal volume that is packed."""
+        return float(self.full.volume_fraction[np.isin(self.full.size, self.truncated.size)].sum())
+
+
+@dataclass(frozen=True)
+class Resistance:
+    """Specific resistance of a cake.
+
+    Attributes
+    ----------
+    resistance_m_kg : float
+        By the Kozeny-Carman equation with additive resistances (paper, eq. 3), m/kg.
+    resistance_sauter_m_kg : float
+        By Carman's specific surface, m/kg.
+    change_per_0p01_porosity : float
+        Relative change of both when the porosity rises by 0.01, to first order.
+    """
+
+    resistance_m_kg: float
+    resistance_sauter_m_kg: float
+    change_per_0p01_porosity: float
+
+
+@dataclass(frozen=True)
+class FilterSize:
+    """A rotary drum filter and the slurry it takes.
+
+    Attributes
+    ----------
+    filter_area_m2, slurry_flow_m3_h : float
+        Area, m2, and slurry flow, m3/h.
+    medium_share : float
+        Share of the medium in the overall resistance.
+    cake_mass_kg_m2 : float
+        Crystals on the drum per area and revolution, kg/m2.
+    cake_thickness_mm : float or None
+        Thickness of the cake, mm, where porosity and crystal density are given.
+    """
+
+    filter_area_m2: float
+    slurry_flow_m3_h: float
+    medium_share: float
+    cake_mass_kg_m2: float
+    cake_thickness_mm: float | None
+
+
+@dataclass(frozen=True)
+class PackingPorosity:
+    """Porosities of one packing.
+
+    Attributes
+    ----------
+    porosity : float
+        Exact, in the interior of the bed: the answer.
+    porosity_from_floor : float
+        Exact, from the floor up, the layer ordered by the floor included.
+    porosity_paper_count : float
+        The paper's estimate: spheres counted whole by centre.
+    soft_contact_compaction : float
+        Estimated loss of porosity because contacts overlap.
+    interior_from_um, interior_to_um, bed_height_um : float
+        Heights, um.
+    particles : int
+        Number of spheres.
+    engine : str
+        What settled them.
+    """
+
+    porosity: float
+    porosity_from_floor: float
+    porosity_paper_count: float
+    soft_contact_compaction: float
+    interior_from_um: float
+    interior_to_um: float
+    bed_height_um: float
+    particles: int
+    engine: str
+
+
+class ResistanceOptions(Model):
+    """Arguments of :func:`resistance`, besides the distribution."""
+
+    porosity: Annotated[float, Field(ge=0.001, le=0.999, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Porosity of the cake."
+    )
+    density_kg_m3: Density | None = Field(
+        default=None, description="Crystal density, kg/m3; that of the crystallizer's kinetics if left out."
+    )
+    sphericity: Annotated[float, Field(ge=0.01, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=1.0, description="Sphericity of the crystals."
+    )
+
+
+class FilterOptions(Filter):
+    """Arguments of :func:`filter_area`."""
+
+    resistance_m_kg: Annotated[float, Field(ge=0, le=1e20, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Specific resistance of the cake, m/kg."
+    )
+    slurry_concentration_kg_m3: Annotated[float, Field(ge=0.001, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Crystals in the slurry, kg/m3 (= g/L)."
+    )
+    slurry_flow_m3_h: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None, description="Slurry to be filtered, m3/h: gives the area it needs."
+    )
+    filter_area_m2: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None, description="Area of a filter, m2, instead of the flow: gives the flow it can take."
+    )
+    porosity: Annotated[float, Field(ge=0.001, le=0.999, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None, description="Porosity of the cake, for its thickness; goes with density_kg_m3."
+    )
+    density_kg_m3: Density | None = Field(
+        default=None, description="Crystal density, kg/m3, for the cake's thickness; goes with porosity."
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> FilterOptions:
+        if (self.slurry_flow_m3_h is None) == (self.filter_area_m2 is None):
+            raise ValueError("needs exactly one of slurry_flow_m3_h and filter_area_m2")
+        if (self.porosity is None) != (self.density_kg_m3 is None):
+            raise ValueError("porosity and density_kg_m3 go together")
+        return self
+
+
+def distribution(**options: Any) -> Distribution:
+    """Make a crystal size distribution: a mixture, a CSV file, or a crystallizer's product.
+
+    Parameters
+    ----------
+    **options
+        Exactly one of ``mixture`` (a mapping or pairs of sizes in um and volume fractions), ``file`` (a CSV with the
+        columns size_um, volume_fraction) and ``kinetics`` (with ``residence_time_min`` and
+        ``slurry_concentration_kg_m3``; ``kinetics_file``, ``bin_width_um``); besides,
+        ``truncate_below_volume_fraction``, ``truncate_below_um`` and ``truncate_above_um``, which leave classes out
+        of the packing.
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+
+    Examples
+    --------
+    >>> round(distribution(mixture={20: 0.5, 50: 0.5}).full.sauter_mean * 1e6, 2)
+    28.57
+    """
+    options = {name: value for name, value in options.items() if value is not None}
+    material = {} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY}
+    study = load(options, material, {"particles": NARROW_PARTICLES})
+    return _distribution(study, options)
+
+
+def resistance(source: Distribution, **options: Any) -> Resistance:
+    """Specific cake resistance from porosity and size distribution, by two laws.
+
+    Parameters
+    ----------
+    source : Distribution
+        The size distribution; all of it counts, whatever is left out of the packing.
+    **options
+        ``porosity``, ``density_kg_m3`` (not needed with kinetics), ``sphericity``.
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+    """
+    given = parse(ResistanceOptions, options, str(ORIGIN))
+    density = given.density_kg_m3 if given.density_kg_m3 is not None else source.density_kg_m3
+    if density is None:
+        raise ConfigError([_problem("density_kg_m3", "(missing)", "must be given")])
+    law = (given.porosity, source.full, density, given.sphericity)
+    try:
+        found = Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))
+        if found.resistance_m_kg <= LARGEST_RESISTANCE:
+            return found
+    except (ZeroDivisionError, OverflowError):
+        pass
+    allowed = f"is too small to compute with, at {density:g} kg/m3 and a sphericity of {given.sphericity:g}"
+    raise ConfigError([_problem("porosity", f"{given.porosity:g}", allowed)])
+
+
+def filter_area(**options: Any) -> FilterSize:
+    """Area of a rotary drum filter for a slurry flow, or the flow that an area can take (paper, eq. 10).
+
+    Parameters
+    ----------
+    **options
+        The keys of the configuration's ``filter`` block; ``resistance_m_kg``, ``slurry_concentration_kg_m3``;
+        exactly one of ``slurry_flow_m3_h`` and ``filter_area_m2``; ``porosity`` and ``density_kg_m3`` for the cake's
+        thickness.
+
+    Raises
+    ------
+    ConfigError, FilterError
+        With every problem.
+    """
+    given = parse(FilterOptions, options, str(ORIGIN))
+    try:
+        with np.errstate(all="ignore"):
+            found = _size(given)
+    except (ZeroDivisionError, OverflowError):
+        raise FilterError(OUT_OF_REACH) from None
+    if not (math.isfinite(found.filter_area_m2) and math.isfinite(found.slurry_flow_m3_h)):
+        raise FilterError(OUT_OF_REACH)
+    return found
+
+
+def porosity(npz: str | Path) -> PackingPorosity:
+    """Measure a packing's porosity.
+
+    Parameters
+    ----------
+    npz : str or Path
+        The packing; its record (``.json``) lies beside it.
+
+    Raises
+    ------
+    PackingRejected
+        If a file is missing, damaged, not what was accepted, or the bed has no interior.
+    """
+    packing, spec = load_packing(Path(npz))
+    try:
+        found = measure(packing, spec)
+    except ValueError as error:
+        raise PackingRejected([f"{npz}: {error}; use more particles"]) from None
+    return PackingPorosity(
+        porosity=found.interior,
+        porosity_from_floor=found.from_floor,
+        porosity_paper_count=found.paper_count,
+        soft_contact_compaction=found.compaction,
+        interior_from_um=found.slab.lower / MICROMETRE,
+        interior_to_um=found.slab.upper / MICROMETRE,
+        bed_height_um=bed_height(packing.position, packing.radius) / MICROMETRE,
+        particles=int(packing.radius.size),
+        engine=spec.engine,
+    )
+
+
+def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> pd.DataFrame:
+    """Tabulate a packing's porosity over height, in exact slices from the floor to the topmost sphere.
+
+    Parameters
+    ----------
+    npz : str or Path
+        The packing.
+    slices_per_diameter : int
+        Slices in one largest diameter.
+
+    Returns
+    -------
+    DataFrame
+        Columns height_um (of a slice's middle) and porosity.
+
+    Raises
+    ------
+    PackingRejected
+        As for :func:`porosity`.
+    """
+    packing, _ = load_packing(Path(npz))
+    top = float((packing.position[:, 2] + packing.radius).max())
+    slices = max(1, math.ceil(top * slices_per_diameter / (2.0 * float(packing.radius.max()))))
+    edges = np.linspace(0.0, top, slices + 1)
+    values = porosity_profile(packing.position, packing.radius, packing.length, edges)
+    return pd.DataFrame({"height_um": 0.5 * (edges[1:] + edges[:-1]) / MICROMETRE, "porosity": values})
+
+
+def load_packing(npz: Path) -> tuple[Packing, PackingSpec]:
+    """Read a packing and what it is made of, and make sure that it is one.
+
+    Raises
+    ------
+    PackingRejected
+        If a file is missing, damaged, or not what was accepted.
+    """
+    if not npz.name:
+        raise PackingRejected([f"{str(npz)!r} is not the name of a packing's file"])
+    try:
+        packing = Packing.load(npz)
+    except PackingRejected as error:
+        raise PackingRejected([f"{npz.parent}: {error}"]) from None
+    try:
+        spec = PackingSpec.from_dict(packing.diagnostics["spec"])
+    except (KeyError, TypeError):
+        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed"]) from None
+    n = packing.radius.size
+    sound = n > 0 and packing.radius.shape == (n,) and packing.position.shape == (n, 3) and packing.length > 0.0
+    if not (sound and np.isfinite(packing.position).all() and (packing.radius > 0.0).all()):
+        raise PackingRejected([f"{npz} does not hold a packing"])
+    return packing, spec
+
+
+def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mapping[str, Any]) -> LoadedStudy:
+    """Check a study of one point.
+
+    Parameters
+    ----------
+    source, material, packing : mapping
+        Arguments of :func:`distribution`, and those of the configuration's blocks.
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+    """
+    problems = list(_source_problems(source))
+    if problems:
+        raise ConfigError(problems)
+    cut = {name: value for name, value in source.items() if name.startswith("truncate_")}
+    study: dict[str, Any] = {"material": dict(material), "packing": dict(packing)}
+    if "kinetics" in source:
+        mixer = {name: source[name] for name in CRYSTALLIZER_OPTIONS if name in source}
+        study["crystallizer"] = {**mixer, **cut}
+        study["sweeps"] = [{"residence_time_min": [source.get("residence_time_min")]}]
+    else:
+        origin = {"file": str(source["file"])} if "file" in source else {"mixture": _classes(source["mixture"])}
+        study["csds"] = {CSD: {**origin, **cut}}
+        study["sweeps"] = [{"csd": [CSD]}]
+    with np.errstate(all="ignore"):
+        try:
+            loaded = check_study(study, ORIGIN)
+        except (ZeroDivisionError, OverflowError):
+            raise ConfigError([_problem("options", "", OUT_OF_REACH)]) from None
+        _check_sums(loaded)
+    return loaded
+
+
+def csd_name(study: LoadedStudy) -> str:
+    """Name of the distribution of a study of one point."""
+    return next(iter(study.csds))
+
+
+def _distribution(study: LoadedStudy, options: dict[str, Any]) -> Distribution:
+    found = study.csds[csd_name(study)]
+    density = study.model.material.density if "kinetics" in options else None
+    return Distribution(found.full, found.truncated, density, found.crystallizer, options)
+
+
+def _source_problems(source: Mapping[str, Any]) -> Sequence[Problem]:
+    """Find what a distribution lacks or has too much of."""
+    known = ("mixture", "file", "residence_time_min", *CRYSTALLIZER_OPTIONS)
+    cuts = ("truncate_below_volume_fraction", "truncate_below_um", "truncate_above_um")
+    problems = [
+        _problem(name, repr(value), f"unknown option; allowed: {', '.join((*known, *cuts))}")
+        for name, value in source.items()
+        if name not in (*known, *cuts)
+    ]
+    named = [name for name in ("mixture", "file", "kinetics") if name in source]
+    if len(named) != 1:
+        said = " and ".join(named) or "(missing)"
+        problems.append(_problem("distribution", said, "needs exactly one of mixture, file and kinetics"))
+    elif named == ["kinetics"]:
+        asked = [name for name in ("residence_time_min", "slurry_concentration_kg_m3") if name not in source]
+        problems += [_problem(name, "(missing)", "must be given with kinetics") for name in asked]
+    else:
+        idle = [name for name in ("residence_time_min", *CRYSTALLIZER_OPTIONS) if name in source]
+        problems += [_problem(name, str(source[name]), "needs kinetics") for name in idle]
+    return problems
+
+
+def _classes(mixture: Any) -> list[dict[str, Any]]:
+    """Classes of a mixture given as a mapping or as pairs."""
+    pairs = mixture.items() if isinstance(mixture, Mapping) else mixture
+    try:
+        return [{"size_um": size, "volume_fraction": fraction} for size, fraction in pairs]
+    except (TypeError, ValueError):
+        allowed = "must be sizes in um with their volume fractions, e.g. {20: 0.5, 50: 0.5}"
+        raise ConfigError([_problem("mixture", repr(mixture)[:60], allowed)]) from None
+
+
+def _check_sums(study: LoadedStudy) -> None:
+    """Refuse sizes so far apart, or so small, that their numbers leave floating point."""
+    csd = study.csds[csd_name(study)].full
+    sums = np.array([csd.sum_x_over_d, csd.sum_x_over_d2, csd.mean_particle_volume])
+    if not (np.isfinite(csd.number_fraction).all() and np.isfinite(sums**2).all() and (sums**2 > 0.0).all()):
+        shown = f"{csd.smallest / MICROMETRE:g} to {csd.largest / MICROMETRE:g} um"
+        raise ConfigError([_problem("distribution", shown, "sizes are too small or too far apart to compute with")])
+
+
+def _size(given: FilterOptions) -> FilterSize:
+    drum, alpha = _drum(given), given.resistance_m_kg
+    thickness = None
+    if given.porosity is not None and given.density_kg_m3 is not None:
+        thickness = float(cake_thickness(drum, alpha, given.porosity, given.density_kg_m3)) / MILLIMETRE
+    if given.slurry_flow_m3_h is not None:
+        flow = given.slurry_flow_m3_h
+        needed = float(area(drum, alpha, flow / HOUR))
+    else:
+        needed = given.filter_area_m2 or 0.0  # the model lets one of the two pass
+        flow = float(capacity(drum, alpha, needed)) * HOUR
+    return FilterSize(
+        filter_area_m2=needed,
+        slurry_flow_m3_h=flow,
+        medium_share=float(medium_share(drum, alpha)),
+        cake_mass_kg_m2=float(cake_mass_per_area(drum, alpha)),
+        cake_thickness_mm=thickness,
+    )
+
+
+def _drum(given: FilterOptions) -> DrumFilter:
+    return DrumFilter(
+        pressure_drop=given.pressure_drop_kPa * KILOPASCAL,
+        submerged_fraction=given.submerged_fraction,
+        rotation_rate=given.rotation_rate_rpm / MINUTE,
+        medium_resistance=given.medium_resistance_1_m,
+        viscosity=given.viscosity_mPa_s * MILLIPASCAL_SECOND,
+        slurry_concentration=given.slurry_concentration_kg_m3,
+    )
+
+
+def _problem(key: str, value: str, allowed: str) -> Problem:
+    return Problem(str(ORIGIN), key, value, allowed)

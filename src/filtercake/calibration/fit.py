@@ -1,0 +1,608 @@
+"""Cohesion (and friction) from measured cake resistances: a smooth model of the packings, weighted least squares.
+
+The packings give ln(alpha) at a few cohesions, with the noise of a few replicates. A Gaussian process per
+distribution joins them; the parameters are those at which all measured ln(alpha) are most likely; intervals come
+from the profile of the likelihood, so that they hold what the measurements and the packings leave open.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage, optimize, special
+
+from filtercake.calibration.pooling import Pool, improbable, pool
+from filtercake.errors import CalibrationError
+from filtercake.units import FloatArray
+
+if TYPE_CHECKING:
+    from sklearn.gaussian_process import GaussianProcessRegressor
+
+CONFIDENCE = 0.95
+GRID = (801, 41)
+"""Grid points of the cohesion and, where it is fitted, of the friction."""
+SHRINKAGE = 8.0
+"""Degrees of freedom that the pooled variance of replicates weighs against a point's own."""
+LENGTH_SCALES = (0.1, 3.0)
+"""Shortest and longest correlation length of ln(alpha), over the range of the parameter."""
+ADVISED_FRICTIONS = (0.0, 0.05)
+"""What the paper advises for dense and for loose cakes."""
+FLAT = 0.8
+"""Share of a parameter's range from which its interval says that it is not determined."""
+DRAWS = 20_000
+"""Random draws behind the interval of a prediction."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A measured resistance.
+
+    Attributes
+    ----------
+    name, csd : str
+        Its name, and that of the distribution.
+    ln_resistance : float
+        Natural logarithm of the resistance in m/kg.
+    standard_error : float
+        Standard error of that, i.e. the relative one of the resistance.
+    """
+
+    name: str
+    csd: str
+    ln_resistance: float
+    standard_error: float
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of the packings, with its range.
+
+    Attributes
+    ----------
+    name : str
+        ``cohesion_kJ_m3`` or ``friction``.
+    low, high : float
+        Its range, in the unit the name says.
+    """
+
+    name: str
+    low: float
+    high: float
+
+    @property
+    def span(self) -> float:
+        """Width of the range."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter.
+
+    Attributes
+    ----------
+    parameter : Parameter
+        Which.
+    value : float
+        Best value.
+    low, high : float
+        Ends of the 95 % interval (profile likelihood).
+    regions : int
+        Separate stretches that the interval consists of.
+    """
+
+    parameter: Parameter
+    value: float
+    low: float
+    high: float
+    regions: int
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval's width."""
+        return 0.5 * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something a user must know before believing a calibration.
+
+    Attributes
+    ----------
+    kind : str
+        ``flat``, ``several``, ``edge``, ``zero``, ``soft``, ``confounded``, ``contradiction``, ``pressure``,
+        ``misfit`` or ``friction``.
+    text : str
+        The same in a sentence.
+    """
+
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The outcome of a fit.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+        The fitted ones: cohesion, and friction where it is fitted.
+    axes : tuple of ndarray
+        Values of each parameter at which the objective was evaluated.
+    deviance : ndarray, one axis per parameter
+        -2 ln(likelihood), less its smallest value.
+    estimates : tuple of Estimate
+        One per parameter.
+    threshold : float
+        Deviance up to which parameters belong to the 95 % interval of one of them.
+    chi_square : float
+        Weighted sum of squares at the best parameters, with the discrepancy left out.
+    degrees_of_freedom : int
+        Distributions measured less parameters fitted; at least 0.
+    discrepancy : float
+        Standard deviation of ln(alpha) between measurements and packings that nothing else explains; 0 where
+        nothing is left to explain.
+    findings : tuple of Finding
+        What a user must know.
+    model_share : float
+        Share of the packings in the variance of the residuals at the best parameters.
+    residual, measured_variance, packed_variance : ndarray, shape (distributions,)
+        Measured less packed ln(alpha) at the best parameters, and the variances of both, by distribution.
+    """
+
+    parameters: tuple[Parameter, ...]
+    axes: tuple[FloatArray, ...]
+    deviance: FloatArray
+    estimates: tuple[Estimate, ...]
+    threshold: float
+    chi_square: float
+    degrees_of_freedom: int
+    discrepancy: float
+    findings: tuple[Finding, ...]
+    model_share: float
+    residual: FloatArray
+    measured_variance: FloatArray
+    packed_variance: FloatArray
+
+    @property
+    def best(self) -> tuple[float, ...]:
+        """The best parameters."""
+        return tuple(estimate.value for estimate in self.estimates)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A predicted resistance with its interval.
+
+    Attributes
+    ----------
+    resistance, low, high : float
+        Median and ends of the 95 % interval, m/kg.
+    """
+
+    resistance: float
+    low: float
+    high: float
+
+
+class Response:
+    """ln(alpha) of one distribution as a smooth function of the parameters, with its standard error."""
+
+    def __init__(self, parameters: Sequence[Parameter], points: FloatArray, ln_resistance: Sequence[FloatArray]):
+        """Fit a Gaussian process (Matern 5/2) to the means of replicates.
+
+        Parameters
+        ----------
+        parameters : sequence of Parameter
+            The axes of ``points``.
+        points : ndarray, shape (n, d)
+            Where packings were made.
+        ln_resistance : sequence of n ndarrays
+            ln(alpha), alpha in m/kg, of the replicates at each point.
+
+        Raises
+        ------
+        CalibrationError
+            With fewer than three points, or without any point of two replicates.
+        """
+        if len(points) < 3:
+            raise CalibrationError(f"{len(points)} points with packings are too few: at least 3 are needed")
+        self.parameters = tuple(parameters)
+        self.points = np.asarray(points, dtype=np.float64)
+        self.mean = np.array([values.mean() for values in ln_resistance])
+        self.standard_error = np.sqrt(_variances(ln_resistance) / [values.size for values in ln_resistance])
+        self.centre = float(self.mean.mean())
+        self.scale = max(float(self.mean.std()), 1e-6)
+        self.process = self._fitted()
+
+    def _fitted(self) -> GaussianProcessRegressor:
+        # here, because parsing the workflow must not cost this import
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+
+        kernel = ConstantKernel(1.0, (0.05, 50.0)) * Matern(
+            np.full(len(self.parameters), 0.5), [LENGTH_SCALES] * len(self.parameters), nu=2.5
+        )
+        noise = np.maximum((self.standard_error / self.scale) ** 2, 1e-10)
+        process = GaussianProcessRegressor(kernel, alpha=noise, n_restarts_optimizer=1, random_state=0)
+        with warnings.catch_warnings():
+            # a length at the end of its range is an answer, not a failure
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            process.fit(self._unit(self.points), (self.mean - self.centre) / self.scale)
+        return process
+
+    def __call__(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance of ln(alpha) at points (n, d), each of shape (n,)."""
+        mean, deviation = self.process.predict(self._unit(points), return_std=True)
+        return self.centre + self.scale * mean, (self.scale * deviation) ** 2
+
+    def _unit(self, points: FloatArray) -> FloatArray:
+        low = np.array([parameter.low for parameter in self.parameters])
+        span = np.array([parameter.span for parameter in self.parameters])
+        return np.asarray((np.atleast_2d(points) - low) / span, dtype=np.float64)
+
+
+def _variances(samples: Sequence[FloatArray]) -> FloatArray:
+    """Variance of one replicate at each point: its own, drawn towards that of all points."""
+    freedom = np.array([values.size - 1.0 for values in samples])
+    squares = np.array([float(np.sum((values - values.mean()) ** 2)) for values in samples])
+    if not freedom.sum() > 0.0:
+        raise CalibrationError("no point has two accepted packings: their spread is not known; ask for more replicates")
+    pooled = squares.sum() / freedom.sum()
+    return np.asarray((SHRINKAGE * pooled + squares) / (SHRINKAGE + freedom), dtype=np.float64)
+
+
+def calibrate(observations: Sequence[Observation], responses: Mapping[str, Response]) -> Calibration:
+    """Find the parameters at which the packings' resistances are the measured ones.
+
+    Maximum likelihood: weighted least squares in ln(alpha), the weights made of the measurements' errors and of the
+    packings' own. Measurements of one distribution share the error of its packings. Where they contradict each other,
+    their scatter is added to the errors of each. Where the distributions scatter more than all this allows, a
+    discrepancy between measurements and packings, one per distribution, is estimated and added.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+        What was measured.
+    responses : mapping of str to Response
+        The packings, by distribution; all of the same parameters.
+
+    Raises
+    ------
+    CalibrationError
+        Without observations, or without the packings of one.
+    """
+    if not observations:
+        raise CalibrationError("there is no measurement to calibrate with")
+    missing = sorted({item.csd for item in observations} - set(responses))
+    if missing:
+        raise CalibrationError(f"not enough packings of {', '.join(missing)} for a fit")
+    parameters = responses[observations[0].csd].parameters
+    axes = tuple(
+        np.linspace(parameter.low, parameter.high, points) for parameter, points in zip(parameters, GRID, strict=False)
+    )
+    grid = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
+    shape = tuple(axis.size for axis in axes)
+    residual, chosen = _residuals(observations, responses, grid)
+    freedom = max(len(chosen.names) - len(parameters), 0)
+    chi_square, discrepancy = _misfit(residual, chosen, freedom)
+    deviance = _deviance(residual, chosen, discrepancy).reshape(shape)
+    deviance -= deviance.min()
+    threshold = float(special.chdtri(1, 1.0 - CONFIDENCE))
+    estimates = tuple(
+        _profile(parameter, axis, deviance, number, threshold)
+        for number, (parameter, axis) in enumerate(zip(parameters, axes, strict=True))
+    )
+    at_best = int(np.argmin(deviance))
+    packed = chosen.model[:, at_best]
+    share = float(np.mean(packed / (packed + chosen.measured + discrepancy**2)))
+    calibration = Calibration(
+        parameters=parameters,
+        axes=axes,
+        deviance=deviance,
+        estimates=estimates,
+        threshold=threshold,
+        chi_square=chi_square,
+        degrees_of_freedom=freedom,
+        discrepancy=discrepancy,
+        findings=(),
+        model_share=share,
+        residual=residual[:, at_best],
+        measured_variance=chosen.measured,
+        packed_variance=packed,
+    )
+    return replace(calibration, findings=(*_contradictions(pooled(observations)), *_findings(calibration)))
+
+
+def pooled(observations: Sequence[Observation]) -> dict[str, Pool]:
+    """Average ln(alpha) by distribution, the scatter of measurements that contradict each other included."""
+    found = {}
+    for name in sorted({item.csd for item in observations}):
+        own = [item for item in observations if item.csd == name]
+        found[name] = pool([item.ln_resistance for item in own], [item.standard_error for item in own])
+    return found
+
+
+@dataclass(frozen=True)
+class _Groups:
+    """Variances by distribution: of the mean of its measurements (m,), and of its packings on the grid (m, n)."""
+
+    names: tuple[str, ...]
+    measured: FloatArray
+    model: FloatArray
+
+
+def _residuals(
+    observations: Sequence[Observation], responses: Mapping[str, Response], grid: FloatArray
+) -> tuple[FloatArray, _Groups]:
+    """Measured less packed ln(alpha) by distribution, shape (m, n), and the variances.
+
+    The measurements of a distribution enter by their weighted mean: it holds all they say about the parameters.
+    """
+    measured = pooled(observations)
+    packed = [responses[name](grid) for name in measured]
+    residual = np.array([own.mean - mean for own, (mean, _) in zip(measured.values(), packed, strict=True)])
+    variance = np.array([own.variance for own in measured.values()])
+    return residual, _Groups(tuple(measured), variance, np.array([variance for _, variance in packed]))
+
+
+def _squares(residual: FloatArray, groups: _Groups, discrepancy: float) -> tuple[FloatArray, FloatArray]:
+    variance = groups.measured[:, None] + groups.model + discrepancy**2
+    return np.sum(residual**2 / variance, axis=0), np.sum(np.log(variance), axis=0)
+
+
+def _deviance(residual: FloatArray, groups: _Groups, discrepancy: float) -> FloatArray:
+    return np.add(*_squares(residual, groups, discrepancy))
+
+
+def _misfit(residual: FloatArray, groups: _Groups, freedom: int) -> tuple[float, float]:
+    """Sum of squares at the optimum, and the discrepancy that makes it no more than it should be."""
+
+    def least(discrepancy: float) -> float:
+        return float(_squares(residual, groups, discrepancy)[0].min())
+
+    chi_square = least(0.0)
+    if not improbable(chi_square, freedom):
+        return chi_square, 0.0
+    widest = float(np.sqrt(np.mean(residual**2, axis=0).min() * len(groups.names) / freedom))
+    return chi_square, float(optimize.brentq(lambda d: least(d) - freedom, 0.0, 1.01 * widest + 1e-9))
+
+
+def _profile(parameter: Parameter, axis: FloatArray, deviance: FloatArray, number: int, threshold: float) -> Estimate:
+    others = tuple(k for k in range(deviance.ndim) if k != number)
+    profile = deviance.min(axis=others) if others else deviance
+    inside = profile <= threshold
+    _, regions = ndimage.label(inside)
+    best = int(np.argmin(profile))
+    low, high = np.flatnonzero(inside)[[0, -1]]
+    return Estimate(
+        parameter,
+        _vertex(axis, profile, best),
+        _crossing(axis, profile, int(low), -1, threshold),
+        _crossing(axis, profile, int(high), 1, threshold),
+        int(regions),
+    )
+
+
+def _vertex(axis: FloatArray, profile: FloatArray, best: int) -> float:
+    """Lowest point of the parabola through the best grid point and its neighbours."""
+    if best in (0, axis.size - 1):
+        return float(axis[best])
+    left, middle, right = profile[best - 1 : best + 2]
+    curvature = left - 2.0 * middle + right
+    shift = 0.5 * (left - right) / curvature if curvature > 0.0 else 0.0
+    return float(axis[best] + shift * (axis[1] - axis[0]))
+
+
+def _crossing(axis: FloatArray, profile: FloatArray, last: int, step: int, threshold: float) -> float:
+    """Where the profile crosses the threshold beyond its last point inside; the end of the range where it doesn't."""
+    beyond = last + step
+    if not 0 <= beyond < axis.size:
+        return float(axis[last])
+    share = (threshold - profile[last]) / (profile[beyond] - profile[last])
+    return float(axis[last] + share * (axis[beyond] - axis[last]))
+
+
+def _contradictions(pools: Mapping[str, Pool]) -> Iterable[Finding]:
+    for name, own in pools.items():
+        if own.scatter > 0.0:
+            text = (
+                f"the {own.degrees_of_freedom + 1} measurements of {name} contradict each other (chi-square "
+                f"{own.chi_square:.1f} with {_degrees(own.degrees_of_freedom)} of freedom): a scatter of "
+                f"{100.0 * own.scatter:.0f} % is added to the error of each"
+            )
+            yield Finding("contradiction", text)
+
+
+def _degrees(number: int) -> str:
+    return f"{number} degree{'' if number == 1 else 's'}"
+
+
+def _findings(calibration: Calibration) -> tuple[Finding, ...]:
+    found: list[Finding] = []
+    distributions = calibration.residual.size
+    for estimate, axis in zip(calibration.estimates, calibration.axes, strict=True):
+        found += _findings_of(estimate, float(axis[1] - axis[0]))
+    fitted = len(calibration.parameters)
+    if distributions < fitted:
+        names = " and ".join(_words(parameter.name) for parameter in calibration.parameters)
+        found.append(
+            Finding(
+                "confounded",
+                f"{distributions} measured distribution{'s' if distributions > 1 else ''} cannot determine {fitted} "
+                f"parameters: {names} trade off against each other; measure more distributions or fix one of them",
+            )
+        )
+    if calibration.discrepancy > 0.0:
+        found.append(
+            Finding(
+                "misfit",
+                "no parameters describe all measurements within their errors "
+                f"(chi-square {calibration.chi_square:.1f} with "
+                f"{_degrees(calibration.degrees_of_freedom)} of freedom): "
+                f"a discrepancy of {100.0 * calibration.discrepancy:.0f} % per distribution is added to the errors",
+            )
+        )
+    elif calibration.degrees_of_freedom == 0 and calibration.chi_square > calibration.threshold:
+        found.append(
+            Finding(
+                "misfit",
+                "the measurements lie outside what the packings reach: even the best parameters miss them by "
+                f"{math.sqrt(calibration.chi_square):.1f} standard errors, and the interval means nothing",
+            )
+        )
+    return tuple(found)
+
+
+def _findings_of(estimate: Estimate, grain: float) -> list[Finding]:
+    parameter, what, width = estimate.parameter, _words(estimate.parameter.name), estimate.parameter.span
+    found = []
+    if estimate.high - estimate.low >= FLAT * width:
+        text = f"the measurements do not determine the {what}: nearly its whole range is in the interval"
+        found.append(Finding("flat", text))
+    if estimate.regions > 1:
+        text = f"the {what} has {estimate.regions} separate stretches that describe the measurements about equally well"
+        found.append(Finding("several", text))
+    if estimate.value >= parameter.high - grain or estimate.high >= parameter.high - grain:
+        text = f"the {what} may lie beyond the upper end of its range ({parameter.high:g}): widen the range"
+        found.append(Finding("edge", text))
+    if estimate.value <= parameter.low + grain or estimate.low <= parameter.low + grain:
+        if parameter.low > 0.0:
+            text = f"the {what} may lie below the lower end of its range ({parameter.low:g}): widen the range"
+            found.append(Finding("edge", text))
+        else:
+            found.append(Finding("zero", f"the measurements do not tell the {what} from zero"))
+    return found
+
+
+def _words(name: str) -> str:
+    return {"cohesion_kJ_m3": "cohesion energy density", "friction": "coefficient of friction"}.get(name, name)
+
+
+def leave_one_out(observations: Sequence[Observation], responses: Mapping[str, Response]) -> dict[str, float]:
+    """Error of predicting each distribution from all others, in ln(alpha), predicted less measured.
+
+    Empty where the other distributions are fewer than the parameters.
+    """
+    measured = pooled(observations)
+    errors: dict[str, float] = {}
+    fitted = max((len(responses[name].parameters) for name in measured), default=0)
+    for name in measured if len(measured) > fitted else []:
+        others = [item for item in observations if item.csd != name]
+        best = calibrate(others, responses).best
+        errors[name] = float(responses[name](np.array([best]))[0][0]) - measured[name].mean
+    return errors
+
+
+def predict(calibration: Calibration, response: Response) -> Prediction:
+    """Resistance of a distribution at the calibrated parameters, with an interval.
+
+    It holds the uncertainty of the parameters (their likelihood), of the packings of this distribution, and the
+    discrepancy that the calibration found.
+    """
+    grid = np.stack([axis.ravel() for axis in np.meshgrid(*calibration.axes, indexing="ij")], axis=1)
+    likelihood = np.exp(-0.5 * calibration.deviance.ravel())
+    random = np.random.default_rng(0)
+    mean, variance = response(grid)
+    drawn = random.choice(len(grid), size=DRAWS, p=likelihood / likelihood.sum())
+    spread = np.sqrt(variance[drawn] + calibration.discrepancy**2)
+    values = mean[drawn] + spread * random.standard_normal(DRAWS)
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low, median, high = np.exp(np.quantile(values, [tail, 0.5, 1.0 - tail]))
+    return Prediction(float(median), float(low), float(high))
+
+
+def advised_friction(porosity: float) -> float:
+    """Coefficient of friction for a cake of some porosity: none under 0.4, 0.05 above (paper, Fig. 15)."""
+    return ADVISED_FRICTIONS[0] if porosity < 0.4 else ADVISED_FRICTIONS[1]
+
+
+def compare_friction(fits: Mapping[float, Calibration]) -> tuple[Finding, ...]:
+    """Say which of several fixed coefficients of friction the measurements prefer.
+
+    Both fits of a comparison are judged by the same errors, or the friction that more packings were made of would
+    win by being packed more often: the larger variance of the packings, and the discrepancy of the fit that needs
+    less of it. Where even that one needs some, the errors are known from the distributions alone, and F takes the
+    place of chi-square.
+
+    Parameters
+    ----------
+    fits : mapping of float to Calibration
+        A calibration of the cohesion alone by coefficient of friction; the first is the one taken.
+
+    Returns
+    -------
+    tuple of Finding
+        One per rival: whether it describes the measurements better, worse or as well as the one taken.
+    """
+    (taken, own), *rivals = fits.items()
+    return tuple(Finding("friction", _compared(taken, own, friction, fit)) for friction, fit in rivals)
+
+
+def _compared(taken: float, own: Calibration, friction: float, rival: Calibration) -> str:
+    discrepancy = min(own.discrepancy, rival.discrepancy)
+    packed = np.maximum(own.packed_variance, rival.packed_variance)
+    variance = own.measured_variance + packed + discrepancy**2
+    squares = {mu: float(np.sum(fit.residual**2 / variance)) for mu, fit in ((taken, own), (friction, rival))}
+    (better, least), (worse, most) = sorted(squares.items(), key=lambda item: item[1])
+    needed = float(special.chdtri(1, 1.0 - CONFIDENCE))
+    if discrepancy > 0.0:
+        freedom = own.degrees_of_freedom
+        needed = float(special.fdtri(1, freedom, CONFIDENCE)) * least / freedom
+    numbers = (
+        f"at equal errors chi-square {squares[friction]:.1f} with {friction:g} and {squares[taken]:.1f} with "
+        f"{taken:g}; it takes a difference of {needed:.1f} to tell them apart"
+    )
+    if most - least > needed:
+        return f"the measurements prefer a friction of {better:g} to {worse:g} ({numbers})"
+    why = ", as a cohesion makes up for either" if own.degrees_of_freedom == 0 else ""
+    return f"the measurements do not tell a friction of {friction:g} from {taken:g}{why} ({numbers})"
+
+
+def next_cohesions(
+    calibration: Calibration | None, candidates: Sequence[float], visited: Sequence[float], coarse: int, most: int
+) -> list[float]:
+    """Choose the cohesions at which to pack next.
+
+    Parameters
+    ----------
+    calibration : Calibration or None
+        The fit so far; None before the first.
+    candidates : sequence of float
+        All that may be visited, ascending, kJ/m3.
+    visited : sequence of float
+        Those that have been.
+    coarse : int
+        How many to begin with, evenly spaced.
+    most : int
+        How many at once later on: those in the interval and next to it that are nearest to the best.
+    """
+    values = np.asarray(candidates, dtype=np.float64)
+    if calibration is None:
+        picked = np.unique(np.round(np.linspace(0, values.size - 1, min(coarse, values.size))).astype(int))
+        return [float(values[k]) for k in picked]
+    cohesion = calibration.estimates[0]
+    grain = float(np.diff(values).max()) if values.size > 1 else 0.0
+    wanted = [
+        float(value)
+        for value in values
+        if cohesion.low - grain <= value <= cohesion.high + grain and not np.isclose(visited, value).any()
+    ]
+    return sorted(sorted(wanted, key=lambda value: abs(value - cohesion.value))[:most])
+
+
+def good_enough(calibration: Calibration, relative: float) -> bool:
+    """Whether the cohesion's interval is as narrow as asked for (half-width over value), or more packings won't help.
+
+    They do not where they make less than a tenth of the variance.
+    """
+    cohesion = calibration.estimates[0]
+    narrow = cohesion.half_width <= relative * max(cohesion.value, math.ulp(1.0))
+    return narrow or calibration.model_share < 0.1

@@ -1,0 +1,425 @@
+"""The command line: the steps of a study on files and numbers, without Snakemake."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from filtercake import __version__, api
+from filtercake.cli import options as words
+from filtercake.crystals.csd import to_table
+from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
+from filtercake.packing.replication import half_width
+from filtercake.packing.result import publish
+from filtercake.study import engine_choice
+from filtercake.study.config import Material, Packing
+from filtercake.study.estimate import estimate
+from filtercake.study.loading import load_study
+from filtercake.study.points import expand
+from filtercake.units import HOUR, MICROMETRE
+
+USER_ERROR = 2
+FAILED = 1
+INTERRUPTED = 130
+TRACEBACK_VARIABLE = "FILTERCAKE_TRACEBACK"
+
+Line = tuple[str, Any, str]
+"""Name, value and unit of one number."""
+Command = Callable[[argparse.Namespace], int]
+
+EXAMPLES = {
+    "csd": "filtercake csd --kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200",
+    "pack": "filtercake pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 "
+    "--porosity-ci95-target 0.003 --output packing",
+    "resistance": "filtercake resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5",
+    "export": "filtercake export pmma pmma_50_s50_mu0_1a2b3c4d --output report",
+    "rerun": "filtercake rerun report",
+    "estimate": "filtercake estimate config/studies/pmma.yaml --cores 100",
+    "porosity": "filtercake porosity packing/r0.npz --profile",
+    "filter-area": (
+        "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 "
+        "--pressure-drop-kPa 53.3 --submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9"
+    ),
+}
+"""One call of each command, shown by its --help."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The arguments; those of the process if left out.
+
+    Returns
+    -------
+    int
+        Exit status: 0 where all went well, 1 where no packing was accepted, 2 where the command or its input is wrong.
+    """
+    parser = build_parser()
+    options = argparse.Namespace()
+    try:
+        options, rest = parser.parse_known_args(argv)
+        if rest:
+            known = vars(options).keys() - {"run", "command"}
+            raise words.UsageError(f"{words.unknown(rest, map(words.flag, known))} (see {options.prog} --help)")
+        status: int = options.run(options)
+        sys.stdout.flush()
+        return status
+    except SystemExit as end:  # --help and --version
+        return int(end.code or 0)
+    except FiltercakeError as error:
+        return _complain(words.in_words(error, vars(options)))
+    except BrokenPipeError:  # the reader of our output (head, less) has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _complain(f"{where}{error.strerror or error}")
+    except KeyboardInterrupt:
+        return _complain("interrupted", INTERRUPTED)
+    except Exception as error:
+        if os.environ.get(TRACEBACK_VARIABLE):
+            raise
+        text = f"unexpected {type(error).__name__}: {error}; {TRACEBACK_VARIABLE}=1 shows where"
+        return _complain(" ".join(text.split()), FAILED)
+
+
+def build_parser() -> words.Parser:
+    """Build the parser of all commands."""
+    parser = words.Parser(
+        prog="filtercake",
+        description="Porosity and specific resistance of filter cakes from crystal size distributions.",
+        epilog="Every command: --help for its options with their units, --json for one JSON object.",
+    )
+    parser.add_argument("--version", action="version", version=f"filtercake {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    _add_csd(commands)
+    _add_pack(commands)
+    _add_porosity(commands)
+    _add_resistance(commands)
+    _add_filter_area(commands)
+    _add_export(commands)
+    _add_rerun(commands)
+    _add_estimate(commands)
+    return parser
+
+
+def _command(commands: Any, name: str, run: Command, text: str) -> words.Parser:
+    parser: words.Parser = commands.add_parser(
+        name,
+        help=text.replace("%", "%%"),  # argparse formats this one, and takes the description as it is
+        description=text,
+        epilog=f"example:\n  {EXAMPLES[name]}",
+    )
+    parser.set_defaults(run=run, prog=parser.prog)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    return parser
+
+
+def _add_csd(commands: Any) -> None:
+    text = "Show a crystal size distribution: its classes, its moments, and how much of it is packed."
+    parser = _command(commands, "csd", _run_csd, text)
+    words.add_source(parser)
+    parser.add_argument("--output", metavar="CSV", help="write the classes, full and as packed, to this file")
+
+
+def _add_pack(commands: Any) -> None:
+    text = (
+        "Pack spheres of a size distribution; print porosity and specific cake resistance (m/kg) with 95 % intervals."
+    )
+    parser = _command(commands, "pack", _run_pack, text)
+    words.add_source(parser)
+    words.add_model(parser.add_argument_group("crystals"), Material)
+    words.add_model(parser.add_argument_group("packing"), Packing)
+    parser.add_argument(
+        "--output",
+        metavar="FOLDER",
+        default="packing",
+        help="receives the packings, r0.npz and r0.json and so on; those of an earlier call with the same options are "
+        "kept. Default: packing",
+    )
+
+
+def _add_porosity(commands: Any) -> None:
+    text = "Measure the porosity of packings: in the interior, from the floor, and as the paper counts it."
+    parser = _command(commands, "porosity", _run_porosity, text)
+    parser.add_argument("packings", nargs="+", metavar="NPZ", help="packing; its record (.json) lies beside it")
+    parser.add_argument(
+        "--profile", action="store_true", help="porosity over height (um) as well, in slices of 1/20 largest diameter"
+    )
+
+
+def _add_resistance(commands: Any) -> None:
+    text = "Specific cake resistance (m/kg) from porosity and size distribution, by two laws."
+    parser = _command(commands, "resistance", _run_resistance, text)
+    words.add_source(parser)
+    words.add_model(parser.add_argument_group("cake"), api.ResistanceOptions)
+
+
+def _add_filter_area(commands: Any) -> None:
+    text = "Area of a rotary drum filter (m2) for a slurry flow (m3/h), or the flow that an area can take."
+    parser = _command(commands, "filter-area", _run_filter_area, text)
+    words.add_model(parser.add_argument_group("filter and slurry"), api.FilterOptions)
+
+
+def _add_export(commands: Any) -> None:
+    text = "Write one packing of a study to a folder that stands alone: deck, cloud, seeds, versions, log, a README."
+    parser = _command(commands, "export", _run_export, text)
+    parser.add_argument("study", metavar="STUDY", help="name of a file in config/studies, or the path of a study file")
+    parser.add_argument("point", metavar="POINT", help="name of the point: column point of summary.csv")
+    parser.add_argument("--replicate", metavar="K", help="which packing, from 0. Default: the first that failed, or 0")
+    parser.add_argument(
+        "--results", metavar="FOLDER", default="results", help="folder of the results. Default: results"
+    )
+    parser.add_argument("--output", metavar="FOLDER", required=True, help="the new folder")
+
+
+def _add_rerun(commands: Any) -> None:
+    text = "Make an exported packing once more, and print its porosity beside the first one's."
+    parser = _command(commands, "rerun", _run_rerun, text)
+    parser.add_argument("folder", metavar="FOLDER", help="what filtercake export wrote")
+
+
+def _add_estimate(commands: Any) -> None:
+    text = "Estimate what a study will cost before it is made: core-hours, wall time, disk."
+    parser = _command(commands, "estimate", _run_estimate, text)
+    parser.add_argument("study", metavar="STUDY", help="path of a study file")
+    parser.add_argument("--cores", metavar="N", default="1", help="cores that are kept busy. Default: 1")
+    parser.add_argument("--cluster", action="store_true", help="each point is started on a node of a cluster")
+
+
+def _run_csd(options: argparse.Namespace) -> int:
+    found = api.distribution(**words.source(options))
+    table = to_table(found.full, found.truncated)
+    if options.output is not None:
+        target = Path(options.output)
+        if not target.name:
+            raise words.UsageError(f"--output = {options.output!r}: must be the name of a file")
+        with publish(target) as temporary:
+            table.to_csv(temporary, index=False)
+    full, packed = found.full, found.truncated
+    values = {
+        "sum_x_over_d_1_m": full.sum_x_over_d,
+        "sum_x_over_d2_1_m2": full.sum_x_over_d2,
+        "sauter_mean_um": full.sauter_mean / MICROMETRE,
+        "packed_sum_x_over_d2_1_m2": packed.sum_x_over_d2,
+        "packed_smallest_um": packed.smallest / MICROMETRE,
+        "packed_largest_um": packed.largest / MICROMETRE,
+        "packed_classes": int(packed.size.size),
+        "kept_volume_fraction": found.kept_volume_fraction,
+    }
+    if options.json:
+        return _print_json({"classes": table.to_dict("records"), **values})
+    _print_table(
+        ["size, um", "volume fraction", "number fraction", "packed volume fraction"], table.iloc[:, [0, 1, 2, 5]]
+    )
+    print()
+    return _print_lines(
+        [
+            ("sum of x/d", values["sum_x_over_d_1_m"], "1/m"),
+            ("sum of x/d2", values["sum_x_over_d2_1_m2"], "1/m2"),
+            ("Sauter mean diameter", values["sauter_mean_um"], "um"),
+            ("packed: kept volume", values["kept_volume_fraction"], ""),
+            ("packed: smallest", values["packed_smallest_um"], "um"),
+            ("packed: largest", values["packed_largest_um"], "um"),
+            ("packed: sum of x/d2", values["packed_sum_x_over_d2_1_m2"], "1/m2"),
+        ]
+    )
+
+
+def _run_pack(options: argparse.Namespace) -> int:
+    source = api.distribution(**words.source(options))
+    asked = words.given(options, (*Material.model_fields, *Packing.model_fields))
+    found = api.pack(source, options.output, say=_say, **asked)
+    for warning in found.warnings:
+        _say(f"warning: {words.with_flags(warning, vars(options))}")
+    summary, status = found.summary, 0 if found.files else FAILED
+    if options.json:
+        _print_json({**summary, "files": [str(path) for path in found.files], "failures": list(found.failures)})
+        return status
+    if not found.files:
+        return status
+    _print_lines(
+        [
+            ("porosity, interior", summary["porosity"], _interval(summary["porosity_ci95"], "")),
+            ("porosity as published", summary["porosity_paper_count"], ""),
+            ("resistance, eq. 3", summary["resistance_m_kg"], _interval(summary["resistance_ci95_m_kg"], "m/kg")),
+            ("resistance, Carman", summary["resistance_sauter_m_kg"], "m/kg"),
+            ("packings", summary["n"], f"of {summary['particles']} spheres by {summary['engine']}"),
+        ]
+    )
+    print(f"packings are in {options.output}")
+    return status
+
+
+def _interval(half: float | None, unit: str) -> str:
+    return unit if half is None else f"+- {_number(half)} {unit} (95 %)".replace("  ", " ")
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+def _run_porosity(options: argparse.Namespace) -> int:
+    found = [api.porosity(npz) for npz in options.packings]
+    profiles = [api.profile(npz) for npz in options.packings] if options.profile else []
+    mean, half = _mean([item.porosity for item in found])
+    if options.json:
+        rows = [{"file": npz, **asdict(item)} for npz, item in zip(options.packings, found, strict=True)]
+        for row, profile in zip(rows, profiles, strict=bool(profiles)):
+            row["profile"] = profile.to_dict("records")
+        return _print_json({"packings": rows, "porosity": mean, "porosity_ci95": half})
+    for k, (npz, item) in enumerate(zip(options.packings, found, strict=True)):
+        print(f"{npz} ({item.particles} spheres, {item.engine})")
+        _print_lines(
+            [
+                ("porosity, interior", item.porosity, ""),
+                ("porosity from the floor", item.porosity_from_floor, ""),
+                ("porosity as published", item.porosity_paper_count, ""),
+                ("loss by soft contacts", item.soft_contact_compaction, ""),
+                ("interior from", item.interior_from_um, "um"),
+                ("interior to", item.interior_to_um, "um"),
+                ("height of the bed", item.bed_height_um, "um"),
+            ]
+        )
+        if profiles:
+            _print_table(["height, um", "porosity"], profiles[k])
+    if len(found) > 1:
+        print(f"mean of {len(found)}: {_number(mean)} +- {_number(half)} (95 %)")
+    return 0
+
+
+def _run_resistance(options: argparse.Namespace) -> int:
+    source = api.distribution(**words.source(options))
+    found = api.resistance(source, **words.given(options, api.ResistanceOptions.model_fields))
+    if options.json:
+        return _print_json(asdict(found))
+    return _print_lines(
+        [
+            ("resistance, sum of x/d2 (eq. 3)", found.resistance_m_kg, "m/kg"),
+            ("resistance, Sauter mean (Carman)", found.resistance_sauter_m_kg, "m/kg"),
+            ("change per 0.01 of porosity", 100.0 * found.change_per_0p01_porosity, "%"),
+        ]
+    )
+
+
+def _run_filter_area(options: argparse.Namespace) -> int:
+    found = api.filter_area(**words.given(options, api.FilterOptions.model_fields))
+    if options.json:
+        return _print_json(asdict(found))
+    lines: list[Line] = [
+        ("filter area", found.filter_area_m2, "m2"),
+        ("slurry flow", found.slurry_flow_m3_h, "m3/h"),
+        ("share of the medium", 100.0 * found.medium_share, "%"),
+        ("cake per area and turn", found.cake_mass_kg_m2, "kg/m2"),
+    ]
+    if found.cake_thickness_mm is not None:
+        lines.append(("cake thickness", found.cake_thickness_mm, "mm"))
+    return _print_lines(lines)
+
+
+def _run_export(options: argparse.Namespace) -> int:
+    number = options.replicate
+    if number is not None and not (number.isascii() and number.isdigit() and len(number) < 10):
+        raise words.UsageError(f"--replicate = {number}: must be a whole number, from 0")
+    asked = None if number is None else int(number)
+    found = api.export(options.study, options.point, options.results, options.output, asked)
+    if options.json:
+        return _print_json({**asdict(found), "folder": str(found.folder)})
+    print(f"{found.point}, replicate {found.replicate} ({found.status}): {found.folder}; see README.md there")
+    return 0
+
+
+def _run_rerun(options: argparse.Namespace) -> int:
+    try:
+        found = api.rerun(options.folder)
+    except EngineMissing:
+        raise
+    except (CloudError, EngineError, PackingRejected) as error:
+        return _complain(f"the packing failed: {error}", FAILED)
+    before = api.first_porosity(options.folder)
+    if options.json:
+        return _print_json({**asdict(found), "first_porosity": before})
+    lines: list[Line] = [("porosity, interior", found.porosity, "")]
+    return _print_lines([*lines, *([("when first made", before, "")] if before is not None else [])])
+
+
+def _run_estimate(options: argparse.Namespace) -> int:
+    asked = options.cores
+    if not (asked.isascii() and asked.isdigit() and len(asked) < 10 and int(asked) > 0):
+        raise words.UsageError(f"--cores = {asked}: must be a whole number, from 1")
+    study = load_study(Path(options.study))
+    points = expand(study, engine_choice.choose)
+    csds = {name: csd.truncated for name, csd in study.csds.items()}
+    found = estimate(points, csds, on_cluster=options.cluster)
+    wall = found.wall_seconds(int(asked))
+    if options.json:
+        return _print_json({**asdict(found), "wall_seconds": wall})
+    return _print_lines(
+        [
+            ("points", found.points, ""),
+            ("packings", found.packings, ""),
+            ("core-hours", found.core_seconds / HOUR, "h"),
+            ("wall time", wall / HOUR, f"h on {asked} cores"),
+            ("disk", found.disk / 1e6, "MB"),
+        ]
+    )
+
+
+def _mean(values: list[float]) -> tuple[float, float]:
+    """Mean, and half-width of its 95 % interval (nan for one value)."""
+    return math.fsum(values) / len(values), half_width(np.array(values))
+
+
+def _complain(text: str, status: int = USER_ERROR) -> int:
+    print(f"filtercake: {' '.join(visible(text).split())}", file=sys.stderr)
+    return status
+
+
+def _print_json(value: dict[str, Any]) -> int:
+    print(json.dumps(_plain(value), indent=1, allow_nan=False))
+    return 0
+
+
+def _plain(value: Any) -> Any:
+    """Values that JSON has: null for what is not a finite number."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value.item() if hasattr(value, "item") else value
+
+
+def _print_lines(lines: Iterable[Line]) -> int:
+    rows = [(name, _number(value), unit) for name, value, unit in lines]
+    width = max(len(name) for name, _, _ in rows)
+    for name, value, unit in rows:
+        print(f"{name:<{width}}  {value:>10} {unit}".rstrip())
+    return 0
+
+
+def _print_table(titles: list[str], table: Any) -> None:
+    print("  ".join(titles))
+    for row in table.itertuples(index=False):
+        print("  ".join(f"{_number(value):>{len(title)}}" for title, value in zip(titles, row, strict=True)))
+
+
+def _number(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,252 @@
+"""Everything generated from the config model: JSON schemas, the study template and the reference of keys.
+
+``python -m filtercake.cli.schema`` rewrites the files; a test fails when they no longer follow from the model.
+"""
+
+from __future__ import annotations
+
+import json
+import types
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from filtercake.calibration.config import Calibration, CohesionRange
+from filtercake.calibration.measurements import ConstantPressureTest, KnownResistance, MeasurementFile
+from filtercake.study.config import (
+    Crystallizer,
+    Csd,
+    Filter,
+    Material,
+    Packing,
+    Published,
+    SizeClass,
+    Study,
+    Sweep,
+    Workflow,
+)
+
+EXAMPLES = {
+    "kinetics": "ammonium_alum",
+    "slurry_concentration_kg_m3": "200",
+    "pressure_drop_kPa": "53.33",
+    "submerged_fraction": "0.3",
+    "rotation_rate_rpm": "0.2",
+    "medium_resistance_1_m": "5.0e+9",
+}
+"""Values of the keys without a default, for the template."""
+
+ROOT = Path(__file__).resolve().parents[3]
+
+_INTRO = {
+    "material": "The crystals, and the base value of every property a sweep may vary.",
+    "packing": "How the packings are made.",
+}
+
+
+def generated() -> dict[Path, str]:
+    """Contents of every generated file, by its path relative to the project's root."""
+    return {
+        Path("workflow/schemas/study.schema.json"): _schema(Study),
+        Path("workflow/schemas/workflow.schema.json"): _schema(Workflow),
+        Path("workflow/schemas/calibration.schema.json"): _schema(Calibration),
+        Path("workflow/schemas/measurements.schema.json"): _schema(MeasurementFile),
+        Path("config/template.yaml"): study_template(),
+        Path("docs/config-reference.md"): reference(),
+    }
+
+
+def study_template() -> str:
+    """Render a study with every key, its default and its description: the file to copy for a study of one's own."""
+    lines = [
+        "# yaml-language-server: $schema=../workflow/schemas/study.schema.json",
+        "# Every key of a study. Copy to config/studies/<name>.yaml, keep what you need: the values of keys that",
+        "# stand behind a # are the defaults. Generated from the config model.",
+        "title: My study",
+        "",
+        "csds:",
+        "  mine:",
+        f"    # {meaning(Csd.model_fields['label'])}",
+        "    # label: My crystals",
+        f"    # {meaning(Csd.model_fields['mixture'])}",
+        "    mixture:",
+        "      - {size_um: 20, volume_fraction: 0.5}",
+        "      - {size_um: 50, volume_fraction: 0.5}",
+        f"    # or: {meaning(Csd.model_fields['file'])}",
+        "    # file: ../csd/example.csv",
+        f"    # {meaning(Csd.model_fields['truncate_below_volume_fraction'])}",
+        "    # truncate_below_volume_fraction: 0.001",
+        f"    # {meaning(Csd.model_fields['truncate_below_um'])}",
+        "    # truncate_below_um: 25",
+        f"    # {meaning(Csd.model_fields['truncate_above_um'])}",
+        "    # truncate_above_um: 500",
+    ]
+    for part, optional in (("crystallizer", Crystallizer), ("filter", Filter)):
+        lines += ["", f"# {meaning(Study.model_fields[part])}", f"# {part}:"]
+        for key, field in optional.model_fields.items():
+            lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")
+            lines.append(f"  # {key}: {EXAMPLES.get(key) or _yaml(field.get_default())}")
+    for name, model, given in (("material", Material, {"density_kg_m3": "1180"}), ("packing", Packing, {})):
+        lines += ["", f"# {_INTRO[name]}", f"{name}:" if given else f"# {name}:"]
+        for key, field in model.model_fields.items():
+            lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")
+            default = _yaml(field.get_default(call_default_factory=True))
+            lines.append(f"  {key}: {given[key]}" if key in given else f"  # {key}: {default}")
+    lines += ["", f"# {meaning(Study.model_fields['sweeps'])}", "sweeps:", "  - csd: [mine]"]
+    for key, field in Sweep.model_fields.items():
+        if key != "csd":
+            lines.append(f"    # {meaning(field)}")
+            lines.append(f"    # {key}: {'8' if key == 'replicates' else _example(key)}")
+    lines += [
+        "",
+        f"# {meaning(Study.model_fields['published'])}",
+        "# published:",
+        "#   - {csd: mine, quantity: porosity, value: 0.36, source: my test, kind: measurement}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def reference() -> str:
+    """Render the reference of every key as a Markdown page."""
+    lines = [
+        "# Reference of configuration keys",
+        "",
+        "Generated from the config model by `make schemas`.",
+    ]
+    parts: list[tuple[str, type[BaseModel]]] = [
+        ("`config/config.yaml`", Workflow),
+        ("A study: `config/studies/<name>.yaml`", Study),
+        ("`csds.<name>`", Csd),
+        ("`csds.<name>.mixture[]`", SizeClass),
+        ("`crystallizer`", Crystallizer),
+        ("`filter`", Filter),
+        ("`material`", Material),
+        ("`packing`", Packing),
+        ("`sweeps[]`", Sweep),
+        ("`published[]`", Published),
+        ("A calibration: `config/calibrations/<name>.yaml`", Calibration),
+        ("`cohesion_kJ_m3` of a calibration", CohesionRange),
+        ("Measurements: `config/measurements/<name>.yaml`", MeasurementFile),
+        ("`tests[]`", ConstantPressureTest),
+        ("`resistances[]`", KnownResistance),
+    ]
+    for title, model in parts:
+        lines += ["", f"## {title}", "", str(model.__doc__ or "").strip(), ""]
+        lines += ["| key | default | allowed | meaning |", "|---|---|---|---|"]
+        for key, field in model.model_fields.items():
+            default = "required" if field.is_required() else f"`{_default_text(field)}`"
+            lines.append(f"| `{key}` | {default} | {allowed(field)} | {meaning(field)} |")
+    return "\n".join(lines) + "\n"
+
+
+def write(root: Path = ROOT) -> None:
+    """Rewrite every generated file below ``root``."""
+    for path, text in generated().items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / path).write_text(text, encoding="utf-8")
+
+
+def _schema(model: type[BaseModel]) -> str:
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
+    return json.dumps(_widen(schema), indent=2, ensure_ascii=False) + "\n"
+
+
+def _widen(node: Any) -> Any:
+    """Let the schema accept what the model does: one value instead of a list of one."""
+    if isinstance(node, dict):
+        node = {key: _widen(value) for key, value in node.items()}
+        if node.get("type") == "array" and node.get("items", {}).get("type") in ("number", "string"):
+            title = {key: node.pop(key) for key in ("title", "description", "default") if key in node}
+            return {**title, "anyOf": [node, node["items"]]}
+        return node
+    return [_widen(item) for item in node] if isinstance(node, list) else node
+
+
+def meaning(field: FieldInfo) -> str:
+    """Say what a field is, in the words of the model."""
+    return (field.description or "").strip()
+
+
+def _default_text(field: FieldInfo) -> str:
+    default = field.get_default(call_default_factory=True)
+    return "(its defaults)" if isinstance(default, BaseModel) else _yaml(default)
+
+
+def _yaml(value: Any) -> str:
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return "[" + ", ".join(_yaml(item) for item in value) + "]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _example(key: str) -> str:
+    examples = {
+        "residence_time_min": "[15, 30, 45, 60] # instead of csd",
+        "cohesion_kJ_m3": "[0, 25, 50]",
+        "friction": "[0, 0.05]",
+        "poisson_ratio": "[0.2, 0.3]",
+        "restitution": "[0.3, 0.6]",
+        "youngs_modulus_MPa": "[5, 10]",
+    }
+    return examples[key]
+
+
+def allowed(field: FieldInfo) -> str:
+    """Say what values a field takes, from its annotation and bounds."""
+    kinds = list(dict.fromkeys(_kinds(field.annotation)))
+    bounds = list(_bounds([*field.metadata, *_inner_metadata(field.annotation)]))
+    return " ".join([" or ".join(kinds), *([", ".join(bounds)] if bounds else [])])
+
+
+def _kinds(annotation: Any) -> Iterator[str]:
+    origin = get_origin(annotation)
+    if origin is Literal:
+        yield ", ".join(f"`{value}`" for value in get_args(annotation))
+    elif origin in (list, dict):
+        inner = get_args(annotation)[-1]
+        yield ("list of " if origin is list else "mapping of names to ") + " or ".join(dict.fromkeys(_kinds(inner)))
+    elif origin in (Union, types.UnionType) or hasattr(annotation, "__metadata__"):
+        for part in get_args(annotation)[: 1 if hasattr(annotation, "__metadata__") else None]:
+            if part is not type(None):
+                yield from _kinds(part)
+    elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield f"{annotation.__name__.lower()} block"
+    else:
+        names = {bool: "true/false", int: "whole number", float: "number", str: "text"}
+        yield names.get(annotation, str(annotation))
+
+
+def _inner_metadata(annotation: Any) -> Iterator[Any]:
+    yield from getattr(annotation, "__metadata__", ())
+    for part in get_args(annotation):
+        if not isinstance(part, str):
+            yield from _inner_metadata(part)
+
+
+def _bounds(metadata: list[Any]) -> Iterator[str]:
+    signs = (
+        ("gt", ">"),
+        ("ge", ">="),
+        ("lt", "<"),
+        ("le", "<="),
+        ("min_length", "at least"),
+        ("max_length", "at most"),
+    )
+    seen = set()
+    for item in metadata:
+        for part in (item, *getattr(item, "metadata", ())):
+            for name, sign in signs:
+                value = getattr(part, name, None)
+                if value is not None and (name, value) not in seen:
+                    seen.add((name, value))
+                    yield f"{sign} {value:g}" + (" long" if "length" in name else "")
+
+
+if __name__ == "__main__":
+    write()

@@ -1,0 +1,252 @@
+"""The paper's tables with our values beside the published ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from filtercake.crystals.crystallizer import SteadyState
+from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
+from filtercake.errors import CrystallizerError
+from filtercake.filtration.resistance import kozeny_carman
+from filtercake.packing.cloud import box_length
+from filtercake.study.config import Published, Study
+from filtercake.study.points import base_rows, bed_of
+from filtercake.units import HOUR, LITRE, MICROMETRE, MINUTE, tidy
+
+Csds = dict[str, FullAndTruncated]
+
+COMPARISON_COLUMNS = (
+    "csd",
+    "cohesion_kJ_m3",
+    "friction",
+    "engine",
+    "source",
+    "published",
+    "n",
+    "porosity_paper_count",
+    "sd",
+    "deviation_sd",
+    "porosity",
+)
+
+
+CRYSTALLIZER_COLUMNS = (
+    "csd",
+    "kinetics",
+    "residence_time_min",
+    "crystallizer_volume_m3",
+    "slurry_concentration_kg_m3",
+    "growth_rate_m_s",
+    "nucleation_rate_1_L_s",
+    "size_scale_um",
+    "mass_mean_size_um",
+    "kept_volume_fraction",
+)
+
+
+def published_value(study: Study, csd: str, quantity: str, kind: str) -> Published | None:
+    """First published value of a quantity for a distribution, None where there is none."""
+    found = (p for p in study.published if (p.csd, p.quantity, p.kind) == (csd, quantity, kind))
+    return next(found, None)
+
+
+def table1(study: Study, csds: Csds) -> pd.DataFrame:
+    """Tabulate the system dimension L of every distribution (paper, Table 1).
+
+    The published value may be for another number of spheres: ``system_dimension_at_published_um`` is ours for that.
+    """
+    rows = []
+    for name, (_, truncated) in csds.items():
+        published = published_value(study, name, "system_dimension_um", "simulation")
+        bed = bed_of(study.packing, truncated)
+        particles = published.particles if published and published.particles else bed.particles
+        length, same = (
+            box_length(truncated, n, study.packing.initial_void_fraction, ratio) / MICROMETRE
+            for n, ratio in ((bed.particles, bed.bed_depth_factor), (particles, 1.0))
+        )
+        rows.append(
+            {
+                "csd": name,
+                "label": study.csds[name].label or name,
+                "particles": bed.particles,
+                "initial_void_fraction": study.packing.initial_void_fraction,
+                "system_dimension_um": round(length, 2),
+                "published_um": _value(published),
+                "published_particles": particles if published else None,
+                "system_dimension_at_published_um": round(same, 2) if published else None,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def table2(study: Study, csds: Csds) -> pd.DataFrame:
+    """Tabulate what each distribution keeps when classes are left out of the packing (paper, Table 2)."""
+    rows = []
+    for name, (full, truncated) in csds.items():
+        kept = np.isin(full.size, truncated.size)
+        rows.append(
+            {
+                "csd": name,
+                "label": study.csds[name].label or name,
+                "residence_time_min": study.csds[name].residence_time_min,
+                "truncate_below_volume_fraction": study.csds[name].truncate_below_volume_fraction,
+                "truncate_below_um": study.csds[name].truncate_below_um,
+                "truncate_above_um": study.csds[name].truncate_above_um,
+                "classes": truncated.size.size,
+                "smallest_um": round(truncated.smallest / MICROMETRE, 2),
+                "largest_um": round(truncated.largest / MICROMETRE, 2),
+                "kept_volume_fraction": _kept(full, truncated),
+                "discarded_volume_fraction": round(float(full.volume_fraction[~kept].sum()), 5),
+                "published_smallest_um": _value(published_value(study, name, "smallest_um", "simulation")),
+                "published_largest_um": _value(published_value(study, name, "largest_um", "simulation")),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def crystallizer_table(study: Study, states: Mapping[str, SteadyState], csds: Csds) -> pd.DataFrame:
+    """Tabulate the crystallizer at every residence time, shortest first (paper, Figs 12 and 13).
+
+    Parameters
+    ----------
+    study : Study
+        Has the slurry flow that makes a volume of a residence time.
+    states : mapping of str to SteadyState
+        The crystallizer behind each of its products.
+    csds : dict of str to (CrystalSizeDistribution, CrystalSizeDistribution)
+        All distributions, full and truncated.
+
+    Returns
+    -------
+    DataFrame
+        :data:`CRYSTALLIZER_COLUMNS`; the mean size is weighted by mass.
+
+    Raises
+    ------
+    CrystallizerError
+        If the study has no crystallizer.
+    """
+    if study.crystallizer is None:
+        raise CrystallizerError("the study has no crystallizer: add the section crystallizer")
+    flow = study.crystallizer.slurry_flow_m3_h / HOUR
+    rows = [
+        {
+            "csd": name,
+            "kinetics": state.kinetics,
+            "residence_time_min": tidy(state.residence_time / MINUTE),
+            "crystallizer_volume_m3": tidy(flow * state.residence_time),
+            "slurry_concentration_kg_m3": state.slurry_concentration,
+            "growth_rate_m_s": state.growth_rate,
+            "nucleation_rate_1_L_s": state.nucleation_rate * LITRE,
+            "size_scale_um": state.size_scale / MICROMETRE,
+            "mass_mean_size_um": state.volume_mean / MICROMETRE,
+            "kept_volume_fraction": _kept(*csds[name]),
+        }
+        for name, state in sorted(states.items(), key=lambda item: item[1].residence_time)
+    ]
+    return pd.DataFrame(rows, columns=list(CRYSTALLIZER_COLUMNS))
+
+
+def _kept(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> float:
+    return round(float(full.volume_fraction[np.isin(full.size, truncated.size)].sum()), 5)
+
+
+def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate porosity and resistance at the base material (paper, Table 4).
+
+    For every distribution: the published simulation, our estimate by the paper's own count, the interior slab
+    (the answer), and the measurement; resistances by eq. 3 with the full distribution.
+    """
+    rows = []
+    for name, (full, _) in csds.items():
+        point = _base_point(study, name, summary)
+        if point is None:
+            continue
+        material = study.material
+        paper_count = float(point["porosity_paper_count"])
+        rows.append(
+            {
+                "csd": name,
+                "label": study.csds[name].label or name,
+                "n": int(point["n"]),
+                "n_failed": int(point["n_failed"]),
+                "engine": point["engine"],
+                "porosity_measured": _value(published_value(study, name, "porosity", "measurement")),
+                "porosity_published": _value(published_value(study, name, "porosity", "simulation")),
+                "porosity_paper_count": paper_count,
+                "porosity_paper_count_ci95": point["porosity_paper_count_ci95"],
+                "porosity": point["porosity"],
+                "porosity_ci95": point["porosity_ci95"],
+                **_measured_resistance(published_value(study, name, "resistance_m_kg", "measurement")),
+                "resistance_published_m_kg": _value(published_value(study, name, "resistance_m_kg", "simulation")),
+                "resistance_paper_count_m_kg": (
+                    kozeny_carman(paper_count, full, material.density, material.sphericity)
+                    if np.isfinite(paper_count)
+                    else np.nan
+                ),
+                "resistance_m_kg": point["resistance_m_kg"],
+                "resistance_ci95_m_kg": point["resistance_ci95_m_kg"],
+                "resistance_sauter_m_kg": point["resistance_sauter_m_kg"],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _base_point(study: Study, csd: str, summary: pd.DataFrame) -> pd.Series[Any] | None:
+    """Row of a distribution at the study's base material, None where no sweep visits it."""
+    found = base_rows(study, summary[summary["csd"] == csd])
+    return None if found.empty else found.iloc[0]
+
+
+def _measured_resistance(published: Published | None) -> dict[str, float]:
+    """Return a measured resistance, or the range where only that is known."""
+    names = ("resistance_measured_m_kg", "resistance_measured_low_m_kg", "resistance_measured_high_m_kg")
+    if published is None:
+        return dict.fromkeys(names, np.nan)
+    if published.low is None or published.high is None:
+        return dict(zip(names, (published.value, np.nan, np.nan), strict=True))
+    return dict(zip(names, (np.nan, published.low, published.high), strict=True))
+
+
+def _value(published: Published | None) -> float:
+    return float("nan") if published is None else published.value
+
+
+def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
+    """Set every published porosity simulated at a visited point beside ours by the same estimator.
+
+    ``sd`` is the standard deviation of one packing, pooled over the study's points of the same engine: a few
+    replicates of one point say little about it. ``deviation_sd`` is the published value's distance from our mean
+    in these: a published value is one packing (or a few), so that within three of them it is no different. Both are
+    blank where no point of the engine has two packings.
+    """
+    good = replicates[replicates["status"] == "ok"]
+    spread = good.groupby(["engine", "point"])["porosity_paper_count"].agg(["var", "count"]).dropna()
+    weight = spread["count"] - 1
+    pooled = ((spread["var"] * weight).groupby("engine").sum() / weight.groupby("engine").sum()) ** 0.5
+    rows = []
+    for entry in study.published:
+        if entry.quantity != "porosity" or entry.cohesion_kJ_m3 is None or entry.friction is None:
+            continue
+        here = (replicates["csd"] == entry.csd) & (replicates["status"] == "ok")
+        here &= np.isclose(replicates["cohesion_kJ_m3"], entry.cohesion_kJ_m3)
+        here &= np.isclose(replicates["friction"], entry.friction)
+        for name in ("poisson_ratio", "restitution", "youngs_modulus_MPa"):
+            here &= np.isclose(replicates[name], getattr(study.material, name))
+        values = replicates.loc[here, "porosity_paper_count"].to_numpy(np.float64)
+        if not values.size:
+            continue
+        engine = str(replicates.loc[here, "engine"].iloc[0])
+        mean, sd = float(values.mean()), float(pooled.get(engine, np.nan))
+        rows.append(
+            (
+                *(entry.csd, entry.cohesion_kJ_m3, entry.friction, engine),
+                *(entry.source, entry.value, values.size, mean, sd, (entry.value - mean) / sd),
+                float(replicates.loc[here, "porosity"].mean()),
+            )
+        )
+    return pd.DataFrame(rows, columns=list(COMPARISON_COLUMNS))

@@ -1,0 +1,176 @@
+"""What came out of a study: one row per packing, then one per point with means and intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from filtercake.crystals.csd import FullAndTruncated
+from filtercake.errors import PackingRejected
+from filtercake.filtration.resistance import carman_sauter, kozeny_carman
+from filtercake.packing.pack import MANIFEST, Outcome
+from filtercake.packing.porosity import measure
+from filtercake.packing.replication import half_width
+from filtercake.packing.result import Packing, read_record
+from filtercake.study.points import POINT_COLUMNS, Point
+from filtercake.units import MICROMETRE
+
+MEASURED = (
+    "porosity",
+    "porosity_paper_count",
+    "resistance_m_kg",
+    "resistance_sauter_m_kg",
+    "resistance_truncated_m_kg",
+)
+
+REPLICATE_COLUMNS = (
+    *POINT_COLUMNS,
+    "replicate",
+    "seed",
+    "status",
+    "reason",
+    "settled",
+    *MEASURED,
+    "porosity_from_floor",
+    "soft_contact_compaction",
+    "overlap_max",
+    "coordination",
+    "particles",
+    "length_um",
+    "bed_height_um",
+    "steps",
+    "wall_s",
+)
+SUMMARY_COLUMNS = (
+    *POINT_COLUMNS,
+    "n",
+    "n_failed",
+    "interval_reached",
+    "porosity",
+    "porosity_ci95",
+    "porosity_paper_count",
+    "porosity_paper_count_ci95",
+    "resistance_m_kg",
+    "resistance_ci95_m_kg",
+    "resistance_sauter_m_kg",
+    "resistance_sauter_ci95_m_kg",
+    "resistance_truncated_m_kg",
+    "soft_contact_compaction",
+    "overlap_max",
+    "wall_s",
+)
+
+
+def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, sphericity: float) -> dict[str, Any]:
+    """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
+
+    Parameters
+    ----------
+    point : Point
+        Where it belongs.
+    packing : Packing
+        The packing.
+    csd : (CrystalSizeDistribution, CrystalSizeDistribution)
+        The full distribution, which the resistance needs all of, and the truncated one, for comparison.
+    sphericity : float
+        For the resistance law.
+    """
+    found, record = measure(packing, point.spec), packing.diagnostics
+    (full, truncated), law = csd, (point.spec.density, sphericity)
+    return {
+        **point.row(),
+        "replicate": record["replicate"],
+        "seed": record["seed"],
+        "status": "ok",
+        "reason": "",
+        "settled": record["settled"],
+        "porosity": found.interior,
+        "porosity_paper_count": found.paper_count,
+        "resistance_m_kg": kozeny_carman(found.interior, full, *law),
+        "resistance_sauter_m_kg": carman_sauter(found.interior, full, *law),
+        "resistance_truncated_m_kg": kozeny_carman(found.interior, truncated, *law),
+        "porosity_from_floor": found.from_floor,
+        "soft_contact_compaction": found.compaction,
+        "overlap_max": record["overlap_max"],
+        "coordination": record["coordination"],
+        "particles": record["particles"],
+        "length_um": record["length_m"] / MICROMETRE,
+        "bed_height_um": record["bed_height_m"] / MICROMETRE,
+        "steps": record["steps"],
+        "wall_s": record["wall_s"],
+    }
+
+
+def failed_row(point: Point, outcome: Outcome, reason: str) -> dict[str, Any]:
+    """Row of a replicate without an accepted packing: a status and a reason, everything else blank."""
+    who = {"replicate": outcome.replicate, "seed": outcome.seed}
+    return {**point.row(), **who, "status": "failed", "reason": reason, "settled": False}
+
+
+def replicates_table(
+    points: Iterable[Point], packings: Path, csds: Mapping[str, FullAndTruncated], sphericity: float
+) -> pd.DataFrame:
+    """Measure every packing of a study, ``REPLICATE_COLUMNS``; a failed or damaged one is a row with a reason.
+
+    Parameters
+    ----------
+    points : iterable of Point
+        The study's points.
+    packings : Path
+        Folder with one folder per point.
+    csds : mapping of str to (CrystalSizeDistribution, CrystalSizeDistribution)
+        The full and truncated distributions by name.
+    sphericity : float
+        For the resistance law.
+    """
+    rows = []
+    for point in points:
+        folder = packings / point.name
+        for entry in read_record(folder / MANIFEST)["replicates"]:
+            outcome = Outcome(**entry)
+            if outcome.status != "ok":
+                rows.append(failed_row(point, outcome, outcome.reason))
+                continue
+            try:
+                packing = Packing.load(folder / f"r{outcome.replicate}.npz")
+            except PackingRejected as error:
+                rows.append(failed_row(point, outcome, str(error)))
+                continue
+            rows.append(replicate_row(point, packing, csds[point.csd], sphericity))
+    return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
+
+
+def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
+    """Average the accepted replicates of every point, with 95 % intervals; ``SUMMARY_COLUMNS``.
+
+    A point of which every replicate failed keeps its row, with n = 0 and blank values.
+    """
+    rows = []
+    for _, group in replicates.groupby("point", sort=False):
+        good = group[group["status"] == "ok"]
+        row: dict[str, Any] = {column: group.iloc[0][column] for column in POINT_COLUMNS}
+        row.update(n=len(good), n_failed=len(group) - len(good), wall_s=good["wall_s"].sum())
+        for column in MEASURED:
+            values = good[column].to_numpy(np.float64)
+            row[column] = values.mean() if values.size else np.nan
+            row[_interval_name(column)] = half_width(values)
+        row["interval_reached"] = _reached(row["porosity_ci95"], row["porosity_ci95_target"])
+        row["soft_contact_compaction"] = good["soft_contact_compaction"].mean()
+        row["overlap_max"] = good["overlap_max"].max()
+        rows.append(row)
+    return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
+
+
+def _reached(half: float, asked: float) -> str:
+    """Say whether an interval is as narrow as asked; nothing where none was asked for."""
+    if np.isnan(asked):
+        return ""
+    return "yes" if half <= asked else "no"
+
+
+def _interval_name(column: str) -> str:
+    return column.replace("_m_kg", "_ci95_m_kg") if column.endswith("_m_kg") else f"{column}_ci95"

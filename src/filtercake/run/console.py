@@ -1,0 +1,107 @@
+"""What a run says at its start and at its end: the plan, where the results are, and why something failed."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from filtercake.packing.pack import MANIFEST
+from filtercake.run.job import failure_reason
+from filtercake.study.points import Point
+
+SHOWN = 5
+"""Failed packings listed by name; the rest is in the table."""
+
+CHATTER = ("Select jobs to execute", "Execute ", "Loading script code", "Adding ")
+"""Starts of Snakemake's lines that come again with every job or file; its log keeps them."""
+
+Points = Mapping[str, Mapping[str, Point]]
+"""Points by study and name."""
+
+
+def worth_reading(record: logging.LogRecord) -> bool:
+    """Whether a line of Snakemake's says more than that it goes on; warnings and errors always do."""
+    return record.levelno > logging.INFO or not record.getMessage().startswith(CHATTER)
+
+
+def plan(points: Points, packings: int) -> str:
+    """One line about what a run is about to do."""
+    engines = sorted({point.spec.engine for group in points.values() for point in group.values()})
+    total = sum(len(group) for group in points.values())
+    return f"filtercake: {', '.join(points)}: {total} points, {packings} packings to make with {', '.join(engines)}"
+
+
+def failed_packings(folder: Path, points: Iterable[str]) -> Iterator[tuple[str, int, str]]:
+    """Point, replicate and reason of every failed packing of a study whose results are in ``folder``."""
+    for point in points:
+        manifest = folder / "packings" / point / MANIFEST
+        if manifest.exists():
+            for entry in json.loads(manifest.read_text(encoding="utf-8"))["replicates"]:
+                if entry["status"] != "ok":
+                    yield point, entry["replicate"], entry["reason"]
+
+
+def success(results: Path, points: Points) -> str:
+    """Say where every study's figures and tables are, and which packings failed."""
+    lines = []
+    for study, group in points.items():
+        folder = results / study
+        lines.append(f"\n{study}: figures in {folder / 'figures'}, tables in {folder / 'tables'}")
+        lines.append(f"{study}: numbers in {folder / 'summary.csv'}")
+        failed = list(failed_packings(folder, group))
+        if failed:
+            lines.append(f"{len(failed)} packings failed (status failed in {folder / 'replicates.csv'}; make retry):")
+        lines += [f"  {point} r{replicate}: {reason}" for point, replicate, reason in failed[:SHOWN]]
+        lines += [f"{study}: {line}" for line in _wide_intervals(folder / "summary.csv")]
+    return "\n".join(lines)
+
+
+def _wide_intervals(summary: Path) -> Iterator[str]:
+    """Say of each point whose porosity is not known as well as asked how well it is known."""
+    if not summary.exists():
+        return
+    table = pd.read_csv(summary)
+    for row in table[table["interval_reached"] == "no"].to_dict("records"):
+        yield (
+            f"{row['point']}: the porosity's interval is {row['porosity_ci95']:.2g} after {row['n']} packings, not "
+            f"{row['porosity_ci95_target']:g} (packing.porosity_ci95_target); raise packing.max_replicates"
+        )
+
+
+def failure(results: Path, points: Points, since: float, cluster_logs: Path | None = None) -> str:
+    """Name the jobs that failed, their reasons and logs, and the command that resumes.
+
+    Parameters
+    ----------
+    results : Path
+        Folder of the results.
+    points : mapping
+        Points by study and name.
+    since : float
+        When the run started, s since the epoch: older logs speak of older runs.
+    cluster_logs : Path, optional
+        Folder of a cluster's own logs; it keeps those of submissions that failed.
+    """
+    lines = []
+    for study in points:
+        folder = results / study / "logs"
+        for log in sorted(folder.rglob("*.log")):
+            reason = failure_reason(log) if log.stat().st_mtime >= since else ""
+            if reason:
+                name = " ".join(log.relative_to(folder).with_suffix("").parts)
+                lines += [f"\nfailed: {name} ({study})", f"  reason: {reason}", f"  log:    {log}"]
+    if not lines:
+        lines.append(
+            "\nfailed; no job says why: it was stopped from outside, or Snakemake's own message above says more"
+        )
+    resume = "make resume (or: snakemake --cores 2 --rerun-incomplete)"
+    if cluster_logs is not None:
+        logs = [log for log in cluster_logs.rglob("*.log") if log.stat().st_mtime >= since]
+        lines += [f"  submission's log: {log}" for log in sorted(logs)[:SHOWN]]
+        resume = "make resume PROFILE=slurm"
+    lines.append(f"\nFinished packings are kept. Resume with: {resume}")
+    return "\n".join(lines)

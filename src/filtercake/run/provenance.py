@@ -1,0 +1,126 @@
+"""Where results come from: the library files behind a module, and the versions behind a run."""
+
+from __future__ import annotations
+
+import ast
+import importlib.metadata
+import platform
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from filtercake import __version__
+from filtercake.packing.result import sha256
+from filtercake.packing.scene import digest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "scikit-learn", "jinja2", "pydantic", "snakemake")
+
+
+@cache
+def sources(module: str) -> tuple[Path, ...]:
+    """List the library's own files that a module depends on, itself included, sorted.
+
+    Snakemake does not see imports: rules name these files as inputs, so that an edit reruns what depends on it.
+
+    Parameters
+    ----------
+    module : str
+        Dotted name below ``filtercake``, e.g. ``packing.pack``.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such module.
+    """
+    start = _file_of(module)
+    if start is None:
+        raise FileNotFoundError(f"filtercake has no module {module!r}")
+    return tuple(sorted(_closure(start)))
+
+
+@cache
+def packing_sources(engine: str) -> tuple[Path, ...]:
+    """List the files behind packings by one engine: an edit of another engine leaves its packings alone.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such engine.
+    """
+    registry, start = _file_of("packing.engines"), _file_of(f"packing.engines.{engine}")
+    if registry is None or start is None:
+        raise FileNotFoundError(f"filtercake has no engine {engine!r}")
+    own = _closure(start, closed=registry)
+    others = set(registry.parent.glob("*.py")) - own
+    return tuple(path for path in sources("packing.pack") if path not in others)
+
+
+def _closure(start: Path, closed: Path | None = None) -> set[Path]:
+    """Collect a file and all it imports; what ``closed`` imports is not followed."""
+    found: set[Path] = set()
+    waiting = [start]
+    while waiting:
+        path = waiting.pop()
+        if path in found:
+            continue
+        found.add(path)
+        waiting += [parent / "__init__.py" for parent in path.parents if ROOT in (parent, *parent.parents)]
+        if path != closed:
+            waiting += _imports(path)
+    return found
+
+
+def code_hash(files: tuple[Path, ...] | list[Path]) -> str:
+    """Hash of the contents of files, independent of where they lie."""
+    return digest(sorted((path.name, sha256(path)) for path in files))
+
+
+def versions() -> dict[str, str]:
+    """Versions of filtercake, Python and the packages it stands on."""
+    found = {"filtercake": __version__, "python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def describe(root: Path) -> dict[str, Any]:
+    """Describe versions, machine and commit, for ``provenance.json``."""
+    return {
+        "versions": versions(),
+        "machine": {"system": platform.system(), "release": platform.release(), "processor": platform.machine()},
+        "commit": _commit(root),
+    }
+
+
+def _commit(root: Path) -> str:
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+
+
+def _file_of(module: str) -> Path | None:
+    path = ROOT.joinpath(*module.split("."))
+    if path.with_suffix(".py").is_file():
+        return path.with_suffix(".py")
+    package = path / "__init__.py"
+    return package if package.is_file() else None
+
+
+@cache
+def _imports(path: Path) -> tuple[Path, ...]:
+    """Files below ``ROOT`` that a file imports; parsed once, since most modules stand behind many others."""
+    names: list[str] = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    own = [name.removeprefix("filtercake.") for name in names if name.startswith("filtercake.")]
+    return tuple(file for name in own if (file := _file_of(name)) is not None)

@@ -1,0 +1,235 @@
+"""What packings will cost before they are made: core-hours, wall time, memory and disk, from measured run times.
+
+The constants are those of the machine of docs/benchmark.md, one core, undisturbed; tests hold them against its tables.
+A packing's time is its spheres times its steps times a time per sphere and step; its steps follow from how many
+free-fall times such a bed needs to come to rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from filtercake.crystals.csd import CrystalSizeDistribution
+from filtercake.packing.cloud import NARROW, PLACEMENT_HEIGHT, box_length
+from filtercake.packing.engines.base import parallelism
+from filtercake.packing.engines.liggghts_as_published import STEPS
+from filtercake.packing.replication import LEAST_REPLICATES
+from filtercake.packing.scene import PackingSpec
+from filtercake.study.points import Point
+from filtercake.units import HOUR, MINUTE, duration
+
+ACCURACY: Final = 1.5
+"""Factor within which a packing's time holds on the machine of the benchmark, undisturbed."""
+
+FALLS: Final = {
+    (False, True): 0.95,
+    (False, False): 1.35,
+    (True, True): 0.72,
+    (True, False): 1.11,
+}
+"""Free-fall times of the highest sphere until a bed is at rest, by whether there is friction and cohesion."""
+WIDE_FALLS: Final = 1.15
+"""Factor on it for a wide distribution, whose bed swings for longer."""
+
+SPHERE_STEP: Final = {
+    ("embedded", False): 21e-9,
+    ("embedded", True): 38e-9,
+    ("liggghts", False): 132e-9,
+    ("liggghts", True): 155e-9,
+    ("liggghts_as_published", False): 700e-9,
+    ("liggghts_as_published", True): 700e-9,
+}
+"""Seconds per sphere and step at ``SPHERES``, by engine and friction."""
+SPHERES: Final = 8000
+GROWTH: Final = 0.1
+"""Exponent of the time per sphere in the number of spheres: less of a large bed is surface, and it needs more steps."""
+WIDE_LIGGGHTS: Final = 1.8
+"""Factor on it for LIGGGHTS and a wide distribution, which fills its one neighbour grid with pairs that never touch."""
+START_SECONDS: Final = 5.0
+"""Seconds of a job before and after its packings: Python, compiled kernels from their cache, records."""
+SPREAD: Final = 0.0026
+"""Standard deviation of one packing's porosity at ``SPREAD_PARTICLES`` spheres."""
+SPREAD_PARTICLES: Final = 2000
+QUANTILE: Final = 2.3
+"""Of Student's t for about nine packings."""
+
+BASE_MB: Final = 1200
+"""Memory of a job before its first sphere: Snakemake on the node (twice 260 MB), Python with numba (330), and room."""
+SPHERE_MB: Final = 0.005
+"""Memory of one sphere while it is packed."""
+
+SPHERE_BYTES: Final = 32
+"""A position and a radius in double precision."""
+PACKING_BYTES: Final = 7_000
+"""A packing's record, and the header of its geometry file."""
+POINT_BYTES: Final = 20_000
+"""A point's log, benchmark, manifest, and what Snakemake notes about its job."""
+STUDY_BYTES: Final = 3_000_000
+"""A study's tables and figures."""
+
+NODE_SECONDS: Final = 10.0
+"""Seconds that a point takes on a cluster's node beside packing: Snakemake is started once for each."""
+WALLTIME_FACTOR: Final = 4.0
+"""How much longer than estimated a job may take before it is ended: other machines, unlucky beds."""
+START_MINUTES: Final = 2.0
+"""Walltime for what a job does beside packing, on a busy file system."""
+LONGEST_MINUTES: Final = 10_080
+"""A week: more than that few clusters grant."""
+
+SUBMISSION_MINUTES: Final = 10.0
+"""Estimated time that makes one submission worth its wait in a cluster's queue."""
+GROUP_SIZES: Final = (32, 8)
+"""Points in one submission, one after the other; the largest that stays within ``SUBMISSION_MINUTES`` is taken."""
+
+Csds = Mapping[str, CrystalSizeDistribution]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a set of points will cost.
+
+    Attributes
+    ----------
+    core_seconds : float
+        Time of all packings on one core, s.
+    longest : float
+        Wall time of the longest job, s.
+    disk : float
+        Bytes written.
+    points, packings : int
+        How many.
+    """
+
+    core_seconds: float
+    longest: float
+    disk: float
+    points: int
+    packings: int
+
+    def wall_seconds(self, cores: int) -> float:
+        """Return the wall time on ``cores`` cores that are kept busy, s: never less than that of the longest job."""
+        return max(self.core_seconds / max(cores, 1), self.longest)
+
+    def words(self, cores: int) -> str:
+        """Say it in one line."""
+        wall = f"{duration(self.wall_seconds(cores))} on {cores} {'core' if cores == 1 else 'cores'}"
+        return (
+            f"estimate: {_amount(self.core_seconds / HOUR)} core-hours, {wall}, {_size(self.disk)} on disk "
+            f"(within a factor of {ACCURACY:g} on the machine of docs/benchmark.md)"
+        )
+
+
+def fall_steps(spec: PackingSpec, csd: CrystalSizeDistribution) -> float:
+    """Return the time steps that a packing of a (truncated) distribution is expected to take."""
+    if spec.engine == "liggghts_as_published":
+        return STEPS
+    length = box_length(csd, spec.particles, spec.initial_void_fraction, spec.bed_depth_factor)
+    fall = spec.free_fall_time(PLACEMENT_HEIGHT * spec.bed_depth_factor * length)
+    falls = FALLS[spec.friction > 0.0, spec.cohesion > 0.0] * (WIDE_FALLS if _wide(csd) else 1.0)
+    return float(min(falls, spec.max_fall_times) * fall / spec.time_step)
+
+
+def packing_seconds(spec: PackingSpec, csd: CrystalSizeDistribution) -> float:
+    """Time of one packing on one core, s.
+
+    Parameters
+    ----------
+    spec : PackingSpec
+        What is packed.
+    csd : CrystalSizeDistribution
+        The (truncated) distribution.
+    """
+    seconds = SPHERE_STEP[spec.engine, spec.friction > 0.0] * spec.particles * fall_steps(spec, csd)
+    if spec.engine == "liggghts_as_published":
+        return seconds
+    if spec.engine == "liggghts" and _wide(csd):
+        seconds *= WIDE_LIGGGHTS
+    return seconds * float((spec.particles / SPHERES) ** GROWTH)
+
+
+def packings_of(point: Point) -> int:
+    """Return the packings that a point is expected to need: those asked for, or those that its interval takes."""
+    if point.porosity_ci95_target is None:
+        return point.replicates
+    spread = SPREAD * math.sqrt(SPREAD_PARTICLES / point.spec.particles)
+    needed = math.ceil((QUANTILE * spread / point.porosity_ci95_target) ** 2)
+    return min(max(needed, LEAST_REPLICATES, point.replicates), point.most_replicates)
+
+
+def job_seconds(point: Point, csd: CrystalSizeDistribution, start: float = START_SECONDS) -> float:
+    """Return the wall time of a point's job on the cores it takes, s; ``start`` is its time beside packing."""
+    # ASSUME: two processes or threads halve the time of a large bed
+    return start + packings_of(point) * packing_seconds(point.spec, csd) / parallelism(point.spec)
+
+
+def walltime_minutes(point: Point, csd: CrystalSizeDistribution, attempt: int = 1) -> int:
+    """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry."""
+    most = point.most_replicates * packing_seconds(point.spec, csd) / parallelism(point.spec)
+    first = math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
+    return min(LONGEST_MINUTES, first << (attempt - 1))
+
+
+def memory_mb(spec: PackingSpec) -> int:
+    """Memory to ask for, MB: measured, with room."""
+    return math.ceil(BASE_MB + SPHERE_MB * spec.particles)
+
+
+def group_size(point: Point, csd: CrystalSizeDistribution) -> int:
+    """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one."""
+    if parallelism(point.spec) > 1:
+        return 1
+    minutes = job_seconds(point, csd, START_SECONDS + NODE_SECONDS) / MINUTE
+    return next((size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES), 1)
+
+
+def estimate(points: Iterable[Point], csds: Csds, *, on_cluster: bool = False) -> Estimate:
+    """Estimate what a study's points will cost.
+
+    Parameters
+    ----------
+    points : iterable of Point
+        Those to be made.
+    csds : mapping of str to CrystalSizeDistribution
+        The (truncated) distributions by name.
+    on_cluster : bool
+        Whether Snakemake is started on a node for each.
+    """
+    start = START_SECONDS + (NODE_SECONDS if on_cluster else 0.0)
+    listed = [(point, csds[point.csd]) for point in points]
+    packings = [packings_of(point) for point, _ in listed]
+    bytes_each = [SPHERE_BYTES * point.spec.particles + PACKING_BYTES for point, _ in listed]
+    written = sum(n * size for n, size in zip(packings, bytes_each, strict=True))
+    return Estimate(
+        core_seconds=sum(job_seconds(point, csd, start) * parallelism(point.spec) for point, csd in listed),
+        longest=max((job_seconds(point, csd, start) for point, csd in listed), default=0.0),
+        disk=written + POINT_BYTES * len(listed) + (STUDY_BYTES if listed else 0),
+        points=len(listed),
+        packings=sum(packings),
+    )
+
+
+def together(estimates: Iterable[Estimate]) -> Estimate:
+    """Add up the estimates of several studies."""
+    listed = list(estimates)
+    return Estimate(
+        core_seconds=sum(item.core_seconds for item in listed),
+        longest=max((item.longest for item in listed), default=0.0),
+        disk=sum(item.disk for item in listed),
+        points=sum(item.points for item in listed),
+        packings=sum(item.packings for item in listed),
+    )
+
+
+def _wide(csd: CrystalSizeDistribution) -> bool:
+    return csd.largest > NARROW * csd.smallest
+
+
+def _amount(hours: float) -> str:
+    return f"{hours:.2g}" if hours < 10.0 else f"{hours:.0f}"
+
+
+def _size(count: float) -> str:
+    return f"{count / 1e6:.0f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"

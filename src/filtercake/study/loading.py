@@ -1,0 +1,435 @@
+"""Read configuration files and say everything that is wrong with them at once: file, key, value, what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
+from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
+from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, shown
+from filtercake.packing import contact_law
+from filtercake.packing.cloud import bed_for
+from filtercake.study import limits
+from filtercake.study.config import (
+    MOST_DISTRIBUTIONS,
+    MOST_PARTICLES,
+    MOST_POINTS,
+    NAME,
+    SWEPT,
+    Crystallizer,
+    Csd,
+    Packing,
+    Study,
+    Workflow,
+)
+from filtercake.study.products import resolve, slurry_problems
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
+from filtercake.user_files import is_file, read_yaml
+
+MOST_PROBLEMS = 1000
+RENAMED = {
+    "slurry_density_kg_m3": ("slurry_concentration_kg_m3", "solids_per_filtrate_kg_m3"),
+    "slurry_concentration_kg_m3": ("solids_per_filtrate_kg_m3",),
+    "slurry_density_exponent": ("slurry_concentration_exponent",),
+    "porosity_interval": ("porosity_ci95_target",),
+    "target_interval": ("relative_ci95_target",),
+    "column_ratio": ("bed_depth_factor",),
+    "void_fraction": ("initial_void_fraction",),
+}
+"""Keys of earlier versions, and what they are called now."""
+"""Problems of a file that are looked into."""
+
+OWN_NAMES = ("benchmark", "benchmark_quick", "benchmarks", "logs", "pages")
+"""Folders of the results that are the workflow's own: no study can have such a name."""
+
+OWN_PREFIXES = ("agreement_", "calibration_")
+"""How the names begin of the studies that the workflow makes itself."""
+
+_OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class LoadedCsd:
+    """A distribution of a study, whole and as it is packed.
+
+    Attributes
+    ----------
+    full, truncated : CrystalSizeDistribution
+        The whole distribution and the one that is packed.
+    label : str
+        Name in figures.
+    file : Path or None
+        The user's CSV it was read from.
+    crystallizer : SteadyState or None
+        The crystallizer that makes it.
+    """
+
+    full: CrystalSizeDistribution
+    truncated: CrystalSizeDistribution
+    label: str
+    file: Path | None
+    crystallizer: SteadyState | None = None
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """A study whose every value has been checked.
+
+    Attributes
+    ----------
+    name : str
+        The study file's stem.
+    path : Path
+        The study file.
+    model : Study
+        Its contents.
+    csds : dict of str to LoadedCsd
+        Its distributions.
+    warnings : tuple of str
+        What is allowed but doubtful.
+    """
+
+    name: str
+    path: Path
+    model: Study
+    csds: dict[str, LoadedCsd]
+    warnings: tuple[str, ...]
+
+
+def load_workflow(values: Any, file: str) -> Workflow:
+    """Check the workflow's own configuration (already parsed).
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+    """
+    for key in ("studies", "calibrations") if isinstance(values, dict) else ():
+        if isinstance(values.get(key), str):  # --config studies=a,b
+            values = {**values, key: [name.strip() for name in values[key].split(",") if name.strip()]}
+    return parse(Workflow, values, file)
+
+
+def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
+    """Paths of the studies asked for; names are looked up in ``folder``.
+
+    Raises
+    ------
+    ConfigError
+        If a study does not exist, two have the same name, or one has a name of the workflow's own.
+    """
+    paths: list[Path] = []
+    problems: list[Problem] = []
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    for index, study in enumerate(workflow.studies):
+        path = Path(study) if study.endswith((".yaml", ".yml")) else folder / f"{study}.yaml"
+        key = f"studies[{index}]"
+        if not NAME.match(path.stem):
+            problems.append(Problem(file, key, repr(study), "a study's file name must be letters, digits, - and _"))
+        elif not is_file(path):
+            allowed = f"no such study; allowed: {', '.join(known)}, or the path of a study file"
+            problems.append(Problem(file, key, repr(study), allowed + _did_you_mean(study, known)))
+        elif path.stem in [other.stem for other in paths]:
+            problems.append(Problem(file, key, repr(study), "two studies of the same name; rename one file"))
+        elif _is_own(path, folder.parent / "benchmarks"):
+            problems.append(Problem(file, key, repr(study), f"the workflow's own name ({_OWN}); rename the file"))
+        paths.append(path)
+    if problems:
+        raise ConfigError(problems)
+    return paths
+
+
+def _is_own(path: Path, benchmarks: Path) -> bool:
+    """Whether a study's results would lie among those of the workflow's own; a benchmark itself may be asked for."""
+    twin = benchmarks / f"{path.stem}.yaml"
+    if twin.is_file():
+        return not twin.samefile(path)
+    return path.stem in OWN_NAMES or path.stem.startswith(OWN_PREFIXES)
+
+
+def load_study(path: Path) -> LoadedStudy:
+    """Read and check a study.
+
+    Raises
+    ------
+    ConfigError
+        With every problem found in the file and the files it names.
+    """
+    return check_study(read_yaml(path), path)
+
+
+def check_study(values: Any, path: Path) -> LoadedStudy:
+    """Check a study's values, however they were given.
+
+    Parameters
+    ----------
+    values : Any
+        What the study's file holds.
+    path : Path
+        Its file, for messages and for the files it names.
+
+    Raises
+    ------
+    ConfigError
+        With every problem found in the values and the files they name.
+    """
+    model = parse(Study, values, str(path))
+    model, kinetics, remarks = resolve(model, path)
+    problems = list(_size_problems(model, str(path)))
+    if problems:  # nothing that is too large is looked into
+        raise ConfigError(problems)
+    problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
+    csds: dict[str, LoadedCsd] = {}
+    for name, csd in model.csds.items():
+        try:
+            csds[name] = _load_csd(name, csd, path.parent, model.crystallizer, kinetics)
+        except (CsdError, CrystallizerError) as error:
+            problems.append(Problem(str(path), *_source_of(name, csd), str(error)))
+    problems += _stability_problems(model, csds, str(path))
+    problems += _bed_problems(model, csds, str(path))
+    if problems:
+        raise ConfigError(problems)
+    return LoadedStudy(path.stem, path, model, csds, (*remarks, *_doubts(model, csds, str(path))))
+
+
+def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
+    """Load several studies and report the problems of all of them together.
+
+    Raises
+    ------
+    ConfigError
+        With every problem of every study.
+    """
+    studies: list[LoadedStudy] = []
+    problems: list[Problem] = []
+    for path in paths:
+        try:
+            studies.append(load_study(path))
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    return studies
+
+
+def parse(model: type[M], values: Any, file: str) -> M:
+    """Check the values of a YAML file against its model.
+
+    Parameters
+    ----------
+    model : type of BaseModel
+        What the file must be.
+    values : Any
+        What :func:`~filtercake.user_files.read_yaml` returned.
+    file : str
+        Its name, for messages.
+
+    Raises
+    ------
+    ConfigError
+        With every problem.
+    """
+    if not isinstance(values, dict):
+        raise ConfigError([Problem(file, "(file)", shown(values), "must be a mapping of keys to values")])
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        found = error.errors(include_url=False)
+        raise ConfigError([_problem(model, item, file) for item in found[:MOST_PROBLEMS]]) from None
+
+
+def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
+    location = [part for part in item["loc"] if part != "[key]"]
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{_plain(part)}" for part in location)
+    key = key.lstrip(".") or "(file)"
+    value, message = shown(item["input"]), item["msg"].removeprefix("Value error, ")
+    if item["type"] == "extra_forbidden":
+        allowed = _allowed_keys(model, location[:-1])
+        new = next((name for name in RENAMED.get(str(location[-1]), ()) if name in allowed), None)
+        message = f"unknown key; allowed here: {', '.join(allowed)}{_did_you_mean(str(location[-1]), allowed)}"
+        if new is not None:
+            message = f"is now called {new}"
+    elif item["type"] == "missing":
+        value, message = "(missing)", "must be given"
+    elif item["type"] == "literal_error":
+        message = f"allowed: {item['ctx']['expected']}"
+    elif item["type"] == "too_short":
+        least = item["ctx"]["min_length"]
+        message = "must hold at least one value" if least == 1 else f"must hold at least {least} values"
+    elif " should " in message:
+        message = "must " + message.partition(" should ")[2]
+    return Problem(file, key, value, message)
+
+
+def _plain(word: str) -> str:
+    """Write a key as it is, or as a short literal where it would spoil the message."""
+    return word if word.isprintable() and len(word) <= LONGEST_SHOWN else shown(word)
+
+
+def _allowed_keys(model: type[BaseModel], location: list[Any]) -> list[str]:
+    """Keys of the part of the model that a location leads to."""
+    named_by_user = False
+    for part in location:
+        if isinstance(part, int) or named_by_user:
+            named_by_user = False
+        elif part in model.model_fields:
+            annotation = model.model_fields[part].annotation
+            named_by_user = get_origin(annotation) is dict
+            model = _inner_model(annotation) or model
+    return list(model.model_fields)
+
+
+def _inner_model(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
+
+
+def _did_you_mean(word: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+def _source_of(name: str, csd: Csd) -> tuple[str, str]:
+    """Key and value that a distribution comes from."""
+    if csd.file:
+        return f"csds.{name}.file", repr(csd.file)
+    if csd.residence_time_min is not None:
+        return f"csds.{name}.residence_time_min", f"{csd.residence_time_min:g}"
+    return f"csds.{name}.mixture", f"{len(csd.mixture or [])} classes"
+
+
+def _load_csd(
+    name: str, csd: Csd, folder: Path, crystallizer: Crystallizer | None, kinetics: Kinetics | None
+) -> LoadedCsd:
+    file = (folder / csd.file) if csd.file else None
+    state: SteadyState | None = None
+    if file is not None:
+        full = read_csd(file)
+    elif csd.residence_time_min is not None and crystallizer is not None and kinetics is not None:
+        state = steady_state(kinetics, csd.residence_time_min * MINUTE, crystallizer.slurry_concentration_kg_m3)
+        full = crystal_size_distribution(state.size_scale, crystallizer.bin_width_um * MICROMETRE)
+    else:
+        classes = csd.mixture or []
+        full = mixture([c.size_um * MICROMETRE for c in classes], [c.volume_fraction for c in classes])
+    truncated = truncate(full, **csd.truncation).csd
+    return LoadedCsd(full, truncated, csd.label or name, file, state)
+
+
+def _size_problems(model: Study, file: str) -> Iterable[Problem]:
+    """Studies with more points or distributions than can be handled."""
+    points = sum(
+        len(sweep.csd or []) * math.prod(len(getattr(sweep, name) or [0]) for name in SWEPT) for sweep in model.sweeps
+    )
+    if points > MOST_POINTS:
+        yield Problem(file, "sweeps", f"{points} points", f"must be at most {MOST_POINTS} points; make several studies")
+    if len(model.csds) > MOST_DISTRIBUTIONS:
+        allowed = f"must be at most {MOST_DISTRIBUTIONS}, the crystallizer's products among them; make several studies"
+        yield Problem(file, "csds", f"{len(model.csds)} distributions", allowed)
+
+
+def _bed_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterable[Problem]:
+    """Swept distributions so broad that a deep enough bed holds too many spheres."""
+    if model.packing.particles is not None:
+        return
+    for name in dict.fromkeys(name for sweep in model.sweeps for name in sweep.csd or [] if name in csds):
+        needed = bed_for(csds[name].truncated, model.packing.initial_void_fraction).particles
+        if needed > MOST_PARTICLES:
+            allowed = (
+                f"needs {needed:.3g} spheres for a deep enough bed; at most {MOST_PARTICLES} are possible: leave "
+                "small crystals out of the packing (truncate_below_um), or give packing.particles"
+            )
+            yield Problem(file, *_source_of(name, model.csds[name]), allowed)
+
+
+def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
+    """Names of distributions that the study does not define."""
+    known = list(model.csds)
+    named = [(f"sweeps[{i}].csd[{j}]", name) for i, s in enumerate(model.sweeps) for j, name in enumerate(s.csd or [])]
+    named += [(f"published[{i}].csd", entry.csd) for i, entry in enumerate(model.published)]
+    for key, name in named:
+        if name not in model.csds:
+            allowed = f"not in csds; allowed: {', '.join(known)}{_did_you_mean(name, known)}"
+            yield Problem(file, key, repr(name), allowed)
+
+
+def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str, tuple[str, float]], limits.Numbers]]:
+    """Every scene of a study as the fence sees it, with the keys and values that a finding may be about."""
+    packing, material = model.packing, model.material
+    for index, sweep in enumerate(model.sweeps):
+        axes = [_values(model, index, name) for name in SWEPT]
+        for name in sweep.csd or []:
+            if name not in csds:
+                continue
+            smallest = csds[name].truncated.smallest
+            for places in itertools.product(*axes):
+                where = dict(zip(SWEPT, places, strict=True))
+                value = {axis: number for axis, (_, number) in where.items()}
+                modulus, poisson = value["youngs_modulus_MPa"] * MEGAPASCAL, value["poisson_ratio"]
+                rayleigh = contact_law.rayleigh_time_step(0.5 * smallest, material.density, modulus, poisson)
+                step = packing.time_step(rayleigh, value["friction"])
+                keys = {
+                    "cohesion": where["cohesion_kJ_m3"],
+                    "time_step": _time_step_key(packing, step / rayleigh),
+                    "restitution": where["restitution"],
+                    "density": ("material.density_kg_m3", material.density),
+                }
+                yield (
+                    keys,
+                    limits.Numbers(
+                        smallest=smallest,
+                        density=material.density,
+                        youngs_modulus=modulus,
+                        poisson_ratio=poisson,
+                        restitution=value["restitution"],
+                        friction=value["friction"],
+                        cohesion=value["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
+                        time_step=step,
+                        engine=packing.engine,
+                    ),
+                )
+
+
+def _time_step_key(packing: Packing, fraction: float) -> tuple[str, float]:
+    if packing.time_step_us is not None:
+        return "packing.time_step_us", packing.time_step_us
+    return "packing.time_step_rayleigh", fraction
+
+
+def _values(model: Study, index: int, name: str) -> list[tuple[str, float]]:
+    """Values of one property that a sweep visits, each with its key."""
+    given = getattr(model.sweeps[index], name)
+    if given is None:
+        return [(f"material.{name}", getattr(model.material, name))]
+    return [(f"sweeps[{index}].{name}[{j}]", value) for j, value in enumerate(given)]
+
+
+def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> list[Problem]:
+    """Scenes outside the fence, one problem per key."""
+    found: dict[str, Problem] = {}
+    for keys, scene in _scenes(model, csds):
+        for finding in limits.refusals(scene):
+            key, value = keys[finding.key]
+            found.setdefault(key, Problem(file, key, f"{value:g}", finding.text))
+    return list(found.values())
+
+
+def _doubts(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterable[str]:
+    """Warnings: allowed, but the answer depends on a choice of numbers."""
+    seen = set()
+    for keys, scene in _scenes(model, csds):
+        for finding in limits.doubts(scene):
+            key, value = keys[finding.key]
+            if key not in seen:
+                seen.add(key)
+                yield f"{file}: {key} = {value:g}: {finding.text}"

@@ -1,0 +1,561 @@
+"""Run time against error: variants of one scene settled in turn, each ensemble held against a reference ensemble.
+
+Packings are chaotic: an error is a property of an ensemble. Each variant's bias is its mean porosity minus the
+reference's, its spread that of one packing; the root mean square of both is the error of a single packing.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from filtercake.crystals.csd import CrystalSizeDistribution, truncate
+from filtercake.packing import contact_law
+from filtercake.packing.cloud import PLACEMENT_HEIGHT, box_length
+from filtercake.packing.engines import ENGINES
+from filtercake.packing.engines.embedded import Embedded
+from filtercake.packing.engines.liggghts import Liggghts
+from filtercake.packing.engines.liggghts_as_published import STEPS, LiggghtsAsPublished
+from filtercake.packing.replication import UntilNarrow
+from filtercake.packing.scene import PackingSpec
+from filtercake.study import limits
+from filtercake.units import GRAVITY, MEGAPASCAL, MICROMETRE, MICROSECOND
+from filtercake.validation.analytic_models import PEERS
+from filtercake.validation.timing import Contender, contender, settle_timed, warm_up
+
+ESTIMATORS = {
+    "porosity": "interior slab",
+    "porosity_from_floor": "slab from the floor",
+    "porosity_paper_count": "count",
+}
+"""Estimators of the porosity by column: all are measured on the same packings."""
+DEFAULT, ANALYTIC = "default", "analytic"
+"""Axes of the variant that the configuration's defaults make, and of models without packings."""
+AS_PUBLISHED_STEP = {"pmma": 0.1 * MICROSECOND, "alum": 0.5 * MICROSECOND}
+ALUM_STEPS = 120_000
+ALUM_SKIN = 10.0 * MICROMETRE
+TOLERANCE = 0.2
+"""Relative uncertainty of a measured time, within which no variant counts as better than another."""
+PEER_CALLS = 20
+COVERAGE_SEED = 3001
+"""Seeds from which an interval is asked for: neither the default's nor the reference's."""
+COVERAGE_MOST = 64
+
+VARIANT_COLUMNS = ("case", "axis", "value", "engine", "particles")
+COLUMNS = (
+    *VARIANT_COLUMNS,
+    "estimator",
+    "n",
+    "n_failed",
+    "seconds",
+    "porosity",
+    "sd",
+    "bias",
+    "bias_se",
+    "error",
+    "resistance_error",
+)
+
+REFERENCE_COLUMNS = (
+    "study",
+    "csd",
+    "cohesion_kJ_m3",
+    "friction",
+    "engine",
+    "particles",
+    "replicate",
+    "seed",
+    "status",
+    "reason",
+    "porosity",
+    "porosity_paper_count",
+    "overlap_max",
+    "steps",
+    "wall_s",
+)
+"""Columns of ``replicates.csv`` that are kept of the reference ensembles."""
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to make packings of a scene.
+
+    Attributes
+    ----------
+    axis : str
+        What differs from the default.
+    value : float
+        How much of it.
+    contender : Contender
+        What is packed and by what.
+    csd : CrystalSizeDistribution
+        The (truncated) distribution.
+    replicates : int
+        Packings of the ensemble.
+    """
+
+    axis: str
+    value: float
+    contender: Contender
+    csd: CrystalSizeDistribution
+    replicates: int
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Porosity that errors are measured against.
+
+    Attributes
+    ----------
+    porosity, standard_error : float
+        Mean of the reference ensemble's interior porosity, and its standard error.
+    """
+
+    porosity: float
+    standard_error: float
+
+
+def variants(case: str, base: PackingSpec, full: CrystalSizeDistribution, quick: bool = False) -> list[Variant]:
+    """List a case's variants, the default first.
+
+    Parameters
+    ----------
+    case : {"pmma", "pmma_friction", "alum", "alum_wide"}
+        Which case.
+    base : PackingSpec
+        The scene at the configuration's defaults.
+    full : CrystalSizeDistribution
+        The whole distribution.
+    quick : bool
+        A quarter of the packings, and of the slow variants none.
+    """
+    make = _Maker(base, full)
+    listed = {"pmma": _pmma, "pmma_friction": _pmma_friction, "alum": _alum, "alum_wide": _alum_wide}[case](make)
+    if not quick:
+        return listed
+    kept = [variant for variant in listed if variant.replicates >= QUICK_LEAST or variant.axis == DEFAULT]
+    return [replace(variant, replicates=max(2, variant.replicates // 4)) for variant in kept]
+
+
+QUICK_LEAST = 8
+"""Replicates under which a variant is left out of a quick run: those that take long have few."""
+
+
+class _Maker:
+    """Makes variants of one scene."""
+
+    def __init__(self, base: PackingSpec, full: CrystalSizeDistribution):
+        self.base = replace(base, engine=Embedded.name, processes=1)
+        self.full = full
+        self.csd = truncate(full, 0.001).csd if full.size.size > 2 else full
+        self.rayleigh = base.time_step / base.rayleigh_fraction(self.csd.smallest)
+
+    def default(self, replicates: int) -> Variant:
+        return self.one(DEFAULT, self.base.time_step / self.rayleigh, replicates)
+
+    def one(self, axis: str, value: float, replicates: int, *, engine: str = Embedded.name, **changed: Any) -> Variant:
+        spec = replace(self.base, **changed)
+        return Variant(axis, value, contender(engine, spec), self.csd, replicates)
+
+    def time_steps(self, given: Mapping[float, int], engine: str = Embedded.name) -> list[Variant]:
+        return [
+            self.one("time step", value, n, engine=engine, time_step=value * self.rayleigh)
+            for value, n in given.items()
+        ]
+
+    def truncations(self, given: Mapping[float, int]) -> list[Variant]:
+        found = []
+        for value, replicates in given.items():
+            csd = truncate(self.full, value).csd
+            step = self.base.time_step * csd.smallest / self.csd.smallest  # the Rayleigh step follows the smallest size
+            spec = replace(self.base, time_step=step)
+            found.append(Variant("truncation", value, contender(Embedded.name, spec), csd, replicates))
+        return found
+
+    def softer(self, given: Mapping[float, int]) -> list[Variant]:
+        """Softer contacts of the same sticking speed: s ~ E^0.8; the Rayleigh step grows as 1/sqrt(E)."""
+        found = []
+        for value, replicates in given.items():
+            ratio = value * MEGAPASCAL / self.base.youngs_modulus
+            changed = {
+                "youngs_modulus": value * MEGAPASCAL,
+                "cohesion": self.base.cohesion * ratio**0.8,
+                "time_step": self.base.time_step / math.sqrt(ratio),
+            }
+            found.append(self.one("softer contacts", value, replicates, **changed))
+        return found
+
+    def liggghts(self, replicates: int) -> list[Variant]:
+        return [self.one("engine", 0.0, replicates, engine=Liggghts.name)] if _runs(Liggghts.name) else []
+
+    def as_published(self, replicates: int, step: float, steps: int, skin: float = 0.0) -> list[Variant]:
+        if not _runs(LiggghtsAsPublished.name):
+            return []
+        made = contender(LiggghtsAsPublished.name, self.base, step, skin, steps)
+        return [Variant("as published", float(steps), made, self.csd, replicates)]
+
+
+def _runs(engine: str) -> bool:
+    return ENGINES[engine]().why_missing() is None
+
+
+def _pmma(make: _Maker) -> list[Variant]:
+    listed = [make.default(32)]
+    listed += make.time_steps({0.06: 4, 0.12: 6, 0.2: 8, 0.36: 16, 0.65: 16, 0.8: 16, 0.95: 16})
+    listed += [make.one("spheres", n, k, particles=n) for n, k in {500: 32, 1000: 24, 4000: 8}.items()]
+    listed += [make.one("stop tolerance", value, 12, porosity_tolerance=value) for value in (1e-3, 3e-4, 3e-5)]
+    listed += [make.one("skin", value, 8, skin=value * MICROMETRE) for value in (1.0, 5.0)]
+    listed += make.softer({2.5: 16, 1.0: 16})
+    listed += make.liggghts(10)
+    if _runs(Liggghts.name):
+        listed += make.time_steps({0.2: 4}, Liggghts.name)
+        listed += [make.one("skin", 10.0, 4, engine=Liggghts.name, skin=10.0 * MICROMETRE)]
+    return listed + make.as_published(3, AS_PUBLISHED_STEP["pmma"], STEPS)
+
+
+def _pmma_friction(make: _Maker) -> list[Variant]:
+    listed = [make.default(20)]
+    listed += make.time_steps({0.12: 6, 0.28: 12, 0.36: 12, 0.5: 12})
+    listed += [make.one("spheres", 1000, 16, particles=1000)]
+    return listed + make.liggghts(4)
+
+
+def _alum(make: _Maker) -> list[Variant]:
+    listed = [make.default(48)]
+    listed += make.time_steps({0.2: 4, 0.36: 8, 0.65: 8, 0.8: 8})
+    # a few thousand spheres hold no large one when the countless small ones take part: less truncation needs millions
+    listed += make.truncations({0.003: 8, 0.01: 8})
+    return listed + make.liggghts(2)
+
+
+def _alum_wide(make: _Maker) -> list[Variant]:
+    listed = [make.default(12)]
+    return listed + make.as_published(1, AS_PUBLISHED_STEP["alum"], ALUM_STEPS, ALUM_SKIN)
+
+
+def time_variants(listed: Iterable[Variant], report: Report = lambda _: None) -> pd.DataFrame:
+    """Settle every variant's replicate k before any replicate k + 1, so that a change of the machine's pace hits all.
+
+    Returns
+    -------
+    DataFrame
+        One row per packing: axis, value, engine, particles and what
+        :func:`filtercake.validation.timing.settle_timed` measures.
+    """
+    chosen = list(listed)
+    for variant in chosen:
+        warm_up(variant.contender, variant.csd)
+    rows = []
+    for replicate in range(max(variant.replicates for variant in chosen)):
+        for variant in chosen:
+            if replicate >= variant.replicates:
+                continue
+            spec = variant.contender.spec
+            row = {"axis": variant.axis, "value": variant.value, "engine": spec.engine, "particles": spec.particles}
+            rows.append({**row, **settle_timed(variant.contender, variant.csd, replicate)})
+            last = rows[-1]
+            report(
+                f"{spec.engine}, {variant.axis} {variant.value:g}, r{replicate}: {last['wall_s']:.1f} s, "
+                f"porosity {last['porosity']:.4f} {'' if last['status'] == 'ok' else last['status']}"
+            )
+    return pd.DataFrame(rows)
+
+
+def time_peers(csd: CrystalSizeDistribution) -> pd.DataFrame:
+    """Evaluate the analytic packing models, in the columns of :func:`time_variants`."""
+    rows = []
+    for name, model in PEERS.items():
+        model(csd)
+        started = time.perf_counter()
+        for _ in range(PEER_CALLS):
+            porosity = model(csd)
+        seconds = (time.perf_counter() - started) / PEER_CALLS
+        row = {"axis": ANALYTIC, "value": 0.0, "engine": name, "particles": 0, "replicate": 0, "steps": 0}
+        rows.append({**row, "status": "ok", "wall_s": seconds, "porosity": porosity})
+    return pd.DataFrame(rows)
+
+
+def errors(case: str, timings: pd.DataFrame, reference: Reference) -> pd.DataFrame:
+    """Measure every variant's error, by every estimator of the porosity.
+
+    Parameters
+    ----------
+    case : str
+        For the table.
+    timings : DataFrame
+        Of :func:`time_variants` and :func:`time_peers`.
+    reference : Reference
+        What the interior porosity should be.
+
+    Returns
+    -------
+    DataFrame
+        One row per variant and estimator, ``COLUMNS``: seconds (median of one packing), porosity (mean), sd (of one
+        packing), bias and its standard error, error (root mean square of bias and sd), resistance_error (root mean
+        square relative error of a Kozeny-Carman resistance).
+    """
+    rows = []
+    for key, group in timings.groupby(list(VARIANT_COLUMNS[1:]), sort=False):
+        good = group[group["status"] == "ok"]
+        for column, name in ESTIMATORS.items():
+            if column not in good:
+                continue
+            values = good[column].dropna().to_numpy(np.float64)
+            if not values.size and column != "porosity":
+                continue  # one line says that nothing was accepted
+            rows.append(
+                {
+                    "case": case,
+                    **dict(zip(VARIANT_COLUMNS[1:], key, strict=True)),
+                    "estimator": name,
+                    "n": values.size,
+                    "n_failed": len(group) - len(good),
+                    "seconds": float(group["wall_s"].median()),
+                    **_error(values, reference),
+                }
+            )
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _error(values: np.ndarray[Any, np.dtype[np.float64]], reference: Reference) -> dict[str, float]:
+    if not values.size:
+        return dict.fromkeys(("porosity", "sd", "bias", "bias_se", "error", "resistance_error"), math.nan)
+    spread = float(values.std(ddof=1)) if values.size > 1 else 0.0
+    own = spread / math.sqrt(values.size)
+    bias = float(values.mean()) - reference.porosity
+    # the noise of the mean is no bias
+    squared = max(bias**2 - own**2 - reference.standard_error**2, 0.0)
+    resistance = np.array([_flow_factor(value) for value in values]) / _flow_factor(reference.porosity) - 1.0
+    return {
+        "porosity": float(values.mean()),
+        "sd": spread,
+        "bias": bias,
+        "bias_se": math.hypot(own, reference.standard_error),
+        "error": math.sqrt(squared + spread**2),
+        "resistance_error": float(np.sqrt(np.mean(resistance**2))),
+    }
+
+
+def _flow_factor(porosity: float) -> float:
+    """Return what the resistance depends on: (1 - eps) / eps^3."""
+    return (1.0 - porosity) / porosity**3
+
+
+def reference_of(table: pd.DataFrame, study: str, friction: float) -> Reference:
+    """Mean interior porosity of a reference ensemble.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The committed reference: rows of ``replicates.csv``.
+    study : str
+        Name of the study that made it.
+    friction : float
+        Which of its points.
+
+    Raises
+    ------
+    ValueError
+        If the table holds no such ensemble.
+    """
+    here = (table["study"] == study) & np.isclose(table["friction"], friction) & (table["status"] == "ok")
+    values = table.loc[here, "porosity"].to_numpy(np.float64)
+    if values.size < 2:
+        raise ValueError(f"the reference holds no ensemble of {study} at friction {friction:g}")
+    return Reference(float(values.mean()), float(values.std(ddof=1) / math.sqrt(values.size)))
+
+
+def coverage(
+    spec: PackingSpec,
+    csd: CrystalSizeDistribution,
+    reference: Reference,
+    interval: float,
+    repeats: int,
+    report: Report = lambda _: None,
+) -> pd.DataFrame:
+    """Ask for an interval again and again, from other seeds, and see how often it holds the reference.
+
+    Parameters
+    ----------
+    spec, csd
+        The scene.
+    reference : Reference
+        Its true porosity.
+    interval : float
+        Half-width asked for.
+    repeats : int
+        How often.
+    report : callable
+        Takes a line per repeat.
+
+    Returns
+    -------
+    DataFrame
+        Columns repeat, n, porosity, half_width, reached, covered (the reference lies within ``interval`` of the mean).
+    """
+    rows = []
+    for repeat in range(repeats):
+        asked = replace(spec, seed=COVERAGE_SEED + repeat)
+        made = Contender(asked.engine, asked, ENGINES[asked.engine]())
+        rule = UntilNarrow(asked, interval)
+        for replicate in range(COVERAGE_MOST):
+            found = settle_timed(made, csd, replicate)
+            if found["status"] == "ok" and rule.add(found["porosity"]):
+                break
+        mean = float(np.mean(rule.values))
+        reached, covered = rule.half_width <= interval, abs(mean - reference.porosity) <= interval
+        rows.append((repeat, len(rule.values), mean, rule.half_width, reached, covered))
+        report(f"repeat {repeat}: {len(rule.values)} packings, {mean:.4f} +- {rule.half_width:.4f}")
+    return pd.DataFrame(rows, columns=["repeat", "n", "porosity", "half_width", "reached", "covered"])
+
+
+def on_front(table: pd.DataFrame, tolerance: float = TOLERANCE) -> pd.Series[bool]:
+    """Say which rows no other beats in both time and error by more than such a measurement can tell.
+
+    That is a tolerance, and of the error at least one standard error of the ratio of two spreads, from as many packings
+    as there are. Analytic models neither count nor beat: they know nothing of cohesion and friction, and what they hit
+    they hit by chance.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows with the columns axis, n, seconds and error.
+    tolerance : float
+        Relative.
+    """
+    seconds, error = table["seconds"].to_numpy(np.float64), table["error"].to_numpy(np.float64)
+    packed = (table["axis"] != ANALYTIC).to_numpy()
+    # relative variance of a standard deviation
+    variance = 0.5 / np.maximum(table["n"].to_numpy(np.float64) - 1.0, 0.5)
+    margin = np.maximum(tolerance, np.sqrt(variance[:, None] + variance[None, :]))
+    faster = seconds[None, :] < (1.0 - tolerance) * seconds[:, None]
+    better = packed[None, :] & faster & (error[None, :] < (1.0 - margin) * error[:, None])
+    return pd.Series(~better.any(axis=1) & packed & np.isfinite(error), index=table.index)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One choice that the model leaves open, and another way to make it."""
+
+    choice: str
+    base: str
+    other: str
+    variant: Variant
+    against: Variant
+
+
+def choices(base: PackingSpec, csd: CrystalSizeDistribution, replicates: int) -> list[Choice]:
+    """List what the paper's model leaves open, each with the ensemble that shows what it does.
+
+    Parameters
+    ----------
+    base : PackingSpec
+        The scene at the defaults.
+    csd : CrystalSizeDistribution
+        Its distribution.
+    replicates : int
+        Packings of each ensemble.
+    """
+    make = _Maker(base, csd)
+    default = make.default(replicates)
+    height = PLACEMENT_HEIGHT * box_length(make.csd, base.particles, base.initial_void_fraction, base.bed_depth_factor)
+
+    def dropped(times: float) -> float:
+        return math.sqrt(base.settling_velocity**2 + 2.0 * GRAVITY * (times - 1.0) * height)
+
+    stiff = 50.0
+    ratio = stiff * MEGAPASCAL / base.youngs_modulus
+    stiffer = {
+        "youngs_modulus": stiff * MEGAPASCAL,
+        "cohesion": base.cohesion * ratio**0.8,
+        "time_step": base.time_step / math.sqrt(ratio),
+    }
+    equal = contact_law.relative_overlap(base.cohesion, base.youngs_modulus, base.poisson_ratio)
+    listed: list[tuple[str, str, str, dict[str, Any]]] = [
+        ("drop height", "the paper's", "2 times", {"settling_velocity": dropped(2.0)}),
+        ("drop height", "the paper's", "10 times", {"settling_velocity": dropped(10.0)}),
+        ("initial speed", "0.01 m/s", "0", {"settling_velocity": 0.0}),
+        ("initial void fraction", f"{base.initial_void_fraction:g}", "0.55", {"initial_void_fraction": 0.55}),
+        ("initial void fraction", f"{base.initial_void_fraction:g}", "0.8", {"initial_void_fraction": 0.8}),
+        ("depth of the bed", "2 L of cloud", "4 L of cloud, as many spheres", {"bed_depth_factor": 2.0}),
+        ("number of spheres", f"{base.particles:,}", f"{4 * base.particles:,}", {"particles": 4 * base.particles}),
+        ("soft contacts", f"E = 5 MPa ({equal:.2%} overlap)", "E = 50 MPa, same sticking speed", stiffer),
+        ("friction of the crystals", "0", "0.05", {"friction": 0.05, "time_step": _frictional_step(base)}),
+    ]
+    return [
+        Choice(choice, own, other, make.one(choice, float(k), replicates, **changed), default)
+        for k, (choice, own, other, changed) in enumerate(listed)
+    ]
+
+
+def _frictional_step(base: PackingSpec) -> float:
+    return base.time_step * limits.default_time_step(0.05) / limits.default_time_step(0.0)
+
+
+def choice_table(
+    timings: pd.DataFrame, listed: Iterable[Choice], full: CrystalSizeDistribution, packed: CrystalSizeDistribution
+) -> pd.DataFrame:
+    """Tabulate what each choice changes: porosity and resistance, with 95 % intervals.
+
+    Parameters
+    ----------
+    timings : DataFrame
+        Of :func:`time_variants`, of the choices' variants and the default.
+    listed : iterable of Choice
+        The choices.
+    full, packed : CrystalSizeDistribution
+        A distribution whole and as it is packed: what truncation changes in the resistance law itself.
+    """
+    good = timings[timings["status"] == "ok"]
+    default = good[good["axis"] == DEFAULT]
+    own = default["porosity"].to_numpy(np.float64)
+    rows = []
+    for k, item in enumerate(listed):
+        mine = good[(good["axis"] == item.choice) & (good["value"] == float(k))]["porosity"].to_numpy(np.float64)
+        rows.append({"choice": item.choice, "model": item.base, "other": item.other, **_change(own, mine)})
+    for column, name in list(ESTIMATORS.items())[1:]:
+        paired = default[column].to_numpy(np.float64) - own
+        half = 1.96 * float(paired.std(ddof=1)) / math.sqrt(paired.size)
+        mean = float(own.mean())
+        factor = _flow_factor(mean + float(paired.mean())) / _flow_factor(mean) - 1.0
+        rows.append(
+            {
+                "choice": "floor layer" if column == "porosity_from_floor" else "whole spheres by centre",
+                "model": "interior slab",
+                "other": name,
+                "porosity_change": float(paired.mean()),
+                "porosity_change_ci95": half,
+                "resistance_change": factor,
+            }
+        )
+    rows.append(
+        {
+            "choice": "truncation, in the resistance law",
+            "model": "full distribution",
+            "other": "as packed",
+            "porosity_change": 0.0,
+            "porosity_change_ci95": 0.0,
+            "resistance_change": packed.sum_x_over_d2 / full.sum_x_over_d2 - 1.0,
+        }
+    )
+    return pd.DataFrame(rows)
+
+
+def _change(
+    own: np.ndarray[Any, np.dtype[np.float64]], other: np.ndarray[Any, np.dtype[np.float64]]
+) -> dict[str, float]:
+    error = math.hypot(*(float(values.std(ddof=1)) / math.sqrt(values.size) for values in (own, other)))
+    mean, changed = float(own.mean()), float(other.mean())
+    return {
+        "porosity_change": changed - mean,
+        "porosity_change_ci95": 1.96 * error,
+        "resistance_change": _flow_factor(changed) / _flow_factor(mean) - 1.0,
+    }

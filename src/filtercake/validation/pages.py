@@ -1,0 +1,191 @@
+"""Pages that are made from measurements: the prose is a template, every number comes from a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pandas as pd
+
+from filtercake.validation.error_against_time import DEFAULT, reference_of
+from filtercake.validation.stability import COVERAGE, OUTCOMES, WRONG, families, undetected
+
+INTERIOR, COUNT = "interior slab", "count"
+PAPER = "as published"
+
+
+def reference_table(replicates: pd.DataFrame, cases: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """Tabulate the reference of every case: case, porosity, standard_error, n.
+
+    Parameters
+    ----------
+    replicates : DataFrame
+        The committed reference packings, rows of ``replicates.csv``.
+    cases : mapping
+        Each case's ``reference`` (a study's name) and ``friction``.
+    """
+    rows = []
+    for name, case in cases.items():
+        found = reference_of(replicates, case["reference"], case["friction"])
+        here = (replicates["study"] == case["reference"]) & (replicates["friction"] == case["friction"])
+        rows.append((name, found.porosity, found.standard_error, int((here & (replicates["status"] == "ok")).sum())))
+    return pd.DataFrame(rows, columns=["case", "porosity", "standard_error", "n"])
+
+
+def benchmark(
+    template: Path,
+    errors: pd.DataFrame,
+    references: pd.DataFrame,
+    choices: pd.DataFrame,
+    coverage: pd.DataFrame,
+    data: Path,
+) -> str:
+    """Write the page on run time and error.
+
+    Parameters
+    ----------
+    template : Path
+        The page's prose.
+    errors : DataFrame
+        Of :func:`filtercake.validation.error_against_time.errors`, all cases, with ``on_front``.
+    references : DataFrame
+        Of :func:`reference_table`.
+    choices : DataFrame
+        Of :func:`filtercake.validation.error_against_time.choice_table`.
+    coverage : DataFrame
+        Of :func:`filtercake.validation.error_against_time.coverage`.
+    data : Path
+        Folder of the committed results of long computations, whose tables the page shows too.
+    """
+    stored = [path for path in sorted(data.glob("*.csv")) if "replicates" not in path.stem]
+    tables = {path.stem: _records(pd.read_csv(path)) for path in stored}
+    return _render(
+        template,
+        errors=_records(errors),
+        references={row["case"]: row for row in _records(references)},
+        choices=_records(choices),
+        coverage={
+            "repeats": len(coverage),
+            "met": int((coverage["covered"] & coverage["reached"]).sum()),
+            "least": int(coverage["n"].min()),
+            "most": int(coverage["n"].max()),
+            "mean": float(coverage["n"].mean()),
+        },
+        headline={case: headline(errors[errors["case"] == case]) for case in errors["case"].unique()},
+        data=tables,
+    )
+
+
+def headline(errors: pd.DataFrame) -> dict[str, Any]:
+    """Compare one case's default with the protocol as published.
+
+    Returns
+    -------
+    dict
+        ``default`` and, where it was run, ``published`` (by its own estimator, the count), ``times_faster``, and
+        ``same_error``: the fastest variant whose error is no larger than the published protocol's, with its
+        ``same_error_times_faster``.
+    """
+    interior = errors[errors["estimator"] == INTERIOR]
+    found: dict[str, Any] = {"default": _only(interior[interior["axis"] == DEFAULT])}
+    published = errors[(errors["axis"] == PAPER) & (errors["estimator"] == COUNT)]
+    if published.empty:
+        return found
+    paper = _only(published)
+    ours = interior[(interior["engine"] == "embedded") & (interior["n_failed"] == 0)]
+    as_good = ours[ours["error"] <= paper["error"]].sort_values("seconds")
+    found |= {"published": paper, "times_faster": paper["seconds"] / found["default"]["seconds"]}
+    if not as_good.empty:
+        fastest = _only(as_good.head(1))
+        found |= {"same_error": fastest, "same_error_times_faster": paper["seconds"] / fastest["seconds"]}
+    return found
+
+
+def stability(template: Path, table: pd.DataFrame) -> str:
+    """Write the page on the stress tests.
+
+    Parameters
+    ----------
+    template : Path
+        The page's prose.
+    table : DataFrame
+        Of :func:`filtercake.validation.stability.run`, all families.
+    """
+    wrong = (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
+    return _render(
+        template,
+        rows=_records(table),
+        counts=[
+            {"fence": fence, **{outcome: int((group["outcome"] == outcome).sum()) for outcome in OUTCOMES}}
+            for fence, group in table.groupby("fence")
+        ],
+        total=len(table),
+        absent=[name for name in families() if name not in set(table["family"])],
+        wrong=_records(table[wrong]),
+        undetected=_records(undetected(table)),
+        drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),
+        gain=float(table.loc[(table["outcome"] == "ok") & (table["fence"] == "allowed"), "energy_gain"].max()),
+    )
+
+
+def reliability(template: Path, table: pd.DataFrame) -> str:
+    """Write the page on injected faults.
+
+    Parameters
+    ----------
+    template : Path
+        The page's prose.
+    table : DataFrame
+        One row per fault: seed and round (the sweep it hit), family, kind, target, lost, accepted, left, commands,
+        equal.
+    """
+    groups = {str(name): group for name, group in table.groupby("family", sort=False)}
+    return _render(
+        template,
+        total=len(table),
+        whole=_outcome(table),
+        families=[{"family": name, "words": _words(group), **_outcome(group)} for name, group in groups.items()],
+        kinds=[
+            {"family": family, "kind": kind, "target": target, **_outcome(group)}
+            for (family, kind, target), group in table.groupby(["family", "kind", "target"])
+        ],
+    )
+
+
+def _outcome(rows: pd.DataFrame) -> dict[str, int]:
+    """Count faults and what became of them; a sweep's outcome is counted once for all faults that hit it."""
+    sweeps = rows.drop_duplicates(["seed", "round"])
+    return {
+        "faults": len(rows),
+        "sweeps": len(sweeps),
+        **{name: int(sweeps[name].sum()) for name in ("lost", "accepted", "left")},
+        "resumed": int((rows["equal"] & (rows["commands"] == 1)).sum()),
+    }
+
+
+def _words(rows: pd.DataFrame) -> str:
+    return ", ".join(str(kind).replace("_", " ") for kind in sorted(rows["kind"].unique()))
+
+
+def _render(template: Path, **values: Any) -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(template.parent),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # Markdown, from our own tables
+    )
+    return environment.get_template(template.name).render(**values)
+
+
+def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
+
+
+def _only(rows: pd.DataFrame) -> dict[str, Any]:
+    if len(rows) != 1:
+        raise ValueError(f"expected one row, found {len(rows)}")
+    return _records(rows)[0]

@@ -1,0 +1,179 @@
+"""Run time against the paper's protocol: the same packing by each protocol, in turn, on one core."""
+
+from __future__ import annotations
+
+import math
+import resource
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from filtercake.crystals.csd import CrystalSizeDistribution
+from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
+from filtercake.packing.accept import accept
+from filtercake.packing.engines import Engine, get_engine
+from filtercake.packing.engines.embedded import Embedded
+from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
+from filtercake.packing.pack import settle
+from filtercake.packing.porosity import measure
+from filtercake.packing.replication import half_width
+from filtercake.packing.result import Packing
+from filtercake.packing.scene import PackingSpec
+
+WARM_UP_PARTICLES = 60
+"""Spheres packed before the clock starts: the embedded engine's kernels are compiled once per machine."""
+MEGABYTE = 1024.0
+"""Kibibytes in the unit of the table's memory."""
+
+POROSITIES = ("porosity", "porosity_from_floor", "porosity_paper_count")
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One way to make a packing.
+
+    Attributes
+    ----------
+    name : str
+        For the table.
+    spec : PackingSpec
+        What is packed.
+    engine : Engine
+        By what.
+    """
+
+    name: str
+    spec: PackingSpec
+    engine: Engine
+
+
+def contender(name: str, spec: PackingSpec, time_step: float = 0.0, skin: float = 0.0, steps: int = 0) -> Contender:
+    """Make a contender of an engine's name; the last three are for the as-published protocol.
+
+    Parameters
+    ----------
+    name : str
+        Name of the engine.
+    spec : PackingSpec
+        The scene, at the time step of the tuned engines.
+    time_step, skin : float
+        Those of the published protocol, s and m; a skin of 0 is one largest diameter.
+    steps : int
+        Its fixed number of time steps.
+    """
+    if name == LiggghtsAsPublished.name:
+        scene = replace(spec, engine=name, time_step=time_step, skin=skin)
+        return Contender(name, scene, LiggghtsAsPublished(steps))
+    return Contender(name, replace(spec, engine=name), get_engine(name))
+
+
+def time_in_turn(
+    contenders: Iterable[Contender],
+    csd: CrystalSizeDistribution,
+    replicates: int,
+    report: Report = lambda _: None,
+) -> pd.DataFrame:
+    """Make every contender's replicate k before any replicate k + 1, so that a change of the machine's pace hits all.
+
+    Returns
+    -------
+    DataFrame
+        Columns engine, particles and those of :func:`settle_timed`: wall_s is the engine's own, peak_memory_MB of
+        this process (the embedded engine's).
+    """
+    listed = list(contenders)
+    for each in listed:
+        warm_up(each, csd)
+    rows: list[dict[str, Any]] = []
+    for replicate in range(replicates):
+        for each in listed:
+            rows.append({"engine": each.name, "particles": each.spec.particles, **settle_timed(each, csd, replicate)})
+            last = rows[-1]
+            report(f"{each.name} r{replicate}: {last['wall_s']:.1f} s, porosity {last['porosity']:.4f}")
+    return pd.DataFrame(rows)
+
+
+def warm_up(each: Contender, csd: CrystalSizeDistribution) -> None:
+    """Let the embedded engine compile what the contender needs: once per machine, and not what is timed."""
+    if isinstance(each.engine, Embedded):
+        few = replace(each.spec, particles=min(WARM_UP_PARTICLES, each.spec.particles), initial_void_fraction=0.8)
+        narrow = CrystalSizeDistribution.from_classes([csd.smallest], [1.0])
+        with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
+            settle(few, narrow, 0, Path(folder), engine=each.engine)
+
+
+def settle_timed(each: Contender, csd: CrystalSizeDistribution, replicate: int) -> dict[str, Any]:
+    """Time one packing; one that is not accepted is timed all the same, and says so.
+
+    Returns
+    -------
+    dict
+        replicate, wall_s, steps, status, porosity, porosity_from_floor, porosity_paper_count, peak_memory_MB; the
+        porosities are blank where the engine itself failed.
+    """
+    started = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
+        try:
+            settled = settle(each.spec, csd, replicate, Path(folder), engine=each.engine)
+        except EngineMissing:
+            raise
+        except (CloudError, EngineError) as error:
+            nothing = dict.fromkeys(POROSITIES, math.nan)
+            seconds = time.monotonic() - started
+            return {"replicate": replicate, "wall_s": seconds, "steps": 0, "status": str(error), **nothing}
+    state, status = settled.state, "ok"
+    try:
+        accept(state, each.spec, settled.cloud, settled.rule)
+    except PackingRejected as error:
+        status = str(error)
+    found = measure(Packing(state.position, state.radius, state.length), each.spec)
+    return {
+        "replicate": replicate,
+        "wall_s": state.wall_time,
+        "steps": state.steps,
+        "status": status,
+        "porosity": found.interior,
+        "porosity_from_floor": found.from_floor,
+        "porosity_paper_count": found.paper_count,
+        "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE,
+    }
+
+
+def compare(timings: pd.DataFrame) -> pd.DataFrame:
+    """Summarise timings: per engine the median time, the ratio to the first engine's, and the porosity.
+
+    ``same_porosity`` says whether the difference of the mean porosities is within its own 95 % interval; it is
+    blank where there is one packing each.
+    """
+    names = list(timings["engine"].unique())
+    base = timings[timings["engine"] == names[0]]
+    rows = []
+    for engine, group in timings.groupby("engine", sort=False):
+        values, reference = group["porosity"].to_numpy(np.float64), base["porosity"].to_numpy(np.float64)
+        difference = float(values.mean() - reference.mean())
+        interval = float(np.hypot(half_width(values), half_width(reference)))
+        rows.append(
+            {
+                "engine": engine,
+                "particles": int(group["particles"].iloc[0]),
+                "n": len(group),
+                "n_not_accepted": int((group["status"] != "ok").sum()),
+                "median_s": group["wall_s"].median(),
+                "times_faster": base["wall_s"].median() / group["wall_s"].median(),
+                "porosity": values.mean(),
+                "porosity_ci95": half_width(values),
+                "difference": difference,
+                "difference_ci95": interval,
+                "same_porosity": abs(difference) <= interval if np.isfinite(interval) else "",
+                "peak_memory_MB": group["peak_memory_MB"].max(),
+            }
+        )
+    return pd.DataFrame(rows)

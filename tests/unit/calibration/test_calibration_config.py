@@ -1,0 +1,187 @@
+"""Calibration files: what they lead to, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from filtercake.calibration.config import candidates, load_calibration, load_calibrations, settings_of
+from filtercake.calibration.fit import pooled
+from filtercake.calibration.measurements import compressibility_by_csd
+from filtercake.calibration.rounds import BATCHES
+from filtercake.errors import ConfigError
+from filtercake.filtration.resistance import implied_porosity
+
+ROOT = Path(__file__).parents[3]
+STUDIES = ROOT / "config" / "studies"
+TINY = (ROOT / "config/test/calibration/tiny.yaml").read_text()
+MEASUREMENTS = "resistances:\n  - {csd: bimodal, resistance_m_kg: VALUE, relative_uncertainty: 0.05, source: made up}\n"
+
+
+def load(folder: Path, text: str = TINY, resistance: str = "1.4e+9", measured: str = MEASUREMENTS):
+    study = ROOT / "config/test/tiny.yaml"
+    (folder / "measured.yaml").write_text(measured.replace("VALUE", resistance))
+    text = text.replace("../tiny.yaml", str(study)).replace("tiny_measurements.yaml", "measured.yaml")
+    (folder / "mine.yaml").write_text(text)
+    return load_calibration(folder / "mine.yaml", STUDIES)
+
+
+def test_a_calibration_is_a_study_of_its_own(tmp_path: Path) -> None:
+    found = load(tmp_path)
+    assert found.name == found.study.name == "calibration_mine"
+    assert found.study.model.packing.engine == "embedded" and found.study.model.packing.replicates == 2
+    assert found.measured == ("bimodal",) and found.packed == ("bimodal", "from_file")
+    (observation,) = found.observations
+    assert observation.ln_resistance == pytest.approx(math.log(1.4e9)) and observation.standard_error == 0.05
+    settings = settings_of(found)
+    assert settings.cohesions == tuple(float(s) for s in range(0, 81, 10))
+    assert settings.density == 1180.0 and settings.frictions == (0.0, 0.1)
+
+
+def test_candidates_are_every_point_in_every_batch(tmp_path: Path) -> None:
+    found = candidates(load(tmp_path), lambda *_: "")
+    assert len(found) == BATCHES * 2 * 9 * 2
+    assert len({item.point.name for item in found}) == len(found)
+    assert {item.point.spec.seed for item in found if item.batch == 0} == {1}
+    assert {item.point.spec.seed for item in found if item.batch == 2} == {3}
+    assert {item.point.replicates for item in found} == {2}
+
+
+@pytest.mark.parametrize(("resistance", "friction"), [("1.4e+9", 0.0), ("0.7e+9", 0.05)])
+def test_friction_follows_the_papers_advice(tmp_path: Path, resistance: str, friction: float) -> None:
+    found = load(tmp_path, TINY.replace("friction: 0\n", "").replace("rival_friction: [0.1]\n", ""), resistance)
+    assert found.frictions == (friction,)
+    assert (found.implied_porosity < 0.4) == (friction == 0.0)
+
+
+BOTH = MEASUREMENTS + MEASUREMENTS.partition("\n")[2].replace("bimodal", "from_file")
+FREE = TINY.replace("friction: 0\n", "").replace("rival_friction: [0.1]\n", "")
+
+
+@pytest.mark.parametrize(
+    ("keys", "frictions"),
+    [
+        ("", (0.0, 0.05)),
+        ("friction: 0.05\n", (0.05, 0.0)),
+        ("friction: 0.2\n", (0.2, 0.0)),
+        ("rival_friction: []\n", (0.0,)),
+        ("rival_friction: [0.3, 0.3, 0]\n", (0.0, 0.3)),
+    ],
+)
+def test_the_advice_is_tested_where_the_distributions_can(tmp_path: Path, keys: str, frictions: tuple) -> None:
+    assert load(tmp_path, FREE + keys, measured=BOTH).frictions == frictions
+    alone = load(tmp_path, FREE + keys)
+    assert alone.frictions == (frictions if "rival" in keys else frictions[:1])
+
+
+AT = "  - {csd: bimodal, resistance_m_kg: VALUE, relative_uncertainty: 0.02, source: a, pressure_drop_kPa: KPA}\n"
+
+
+def pressed(*values: tuple[float, float], more: str = "") -> str:
+    return "resistances:\n" + "".join(AT.replace("VALUE", f"{v}").replace("KPA", f"{p}") for p, v in values) + more
+
+
+RISING = [(p, 1.4e9 * (p / 50) ** 0.3 * (1.0 + 0.005 * (-1) ** k)) for k, p in enumerate((25, 50, 75, 100))]
+
+
+def test_a_change_with_pressure_is_said(tmp_path: Path) -> None:
+    found = load(tmp_path, measured=pressed(*RISING))
+    assert len(found.observations) == 4 and not found.warnings
+    (doubt,) = settings_of(found).doubts
+    assert doubt.kind == "pressure" and "give a pressure_kPa to calibrate at" in doubt.text
+    assert "the resistance of bimodal rises with pressure from 25 to 100 kPa (exponent 0.3" in doubt.text
+    # what the pressures change is in the error of the mean
+    assert pooled(found.observations)["bimodal"].scatter > 0.1
+    assert load(tmp_path, measured=pressed(*[(p, 1.4e9) for p, _ in RISING])).doubts == ()
+
+
+def test_resistances_are_brought_to_one_pressure(tmp_path: Path) -> None:
+    more = MEASUREMENTS.partition("\n")[2].replace("VALUE", "1.3e+9")
+    found = load(tmp_path, TINY + "pressure_kPa: 60\n", measured=pressed(*RISING, more=more))
+    brought, unknown = found.observations
+    (fit,) = compressibility_by_csd(found.measurements).values()
+    value, low, high = (float(end) for end in fit.resistance_at(60e3))
+    assert (brought.name, brought.csd, unknown.name) == ("bimodal at 60 kPa", "bimodal", "bimodal (5)")
+    assert math.exp(brought.ln_resistance) == pytest.approx(value) == pytest.approx(1.4e9 * 1.2**0.3, rel=0.01)
+    assert 2.0 * 1.96 * brought.standard_error == pytest.approx(math.log(high / low), rel=1e-4)
+    # what has no pressure stays as it is, and is named
+    (doubt,) = found.doubts
+    assert doubt.text == "bimodal (5) of bimodal is of an unknown pressure, and taken as it is for 60 kPa"
+    mean = 0.5 * sum(implied_porosity(alpha, found.study.csds["bimodal"].full, 1180.0, 1.0) for alpha in (value, 1.3e9))
+    assert found.implied_porosity == pytest.approx(mean)
+
+
+def test_one_pressure_cannot_be_brought_to_another(tmp_path: Path) -> None:
+    text = TINY + "pressure_kPa: 60\n"
+    (doubt,) = load(tmp_path, text, measured=pressed((50, 1.4e9))).doubts
+    assert "is of 50 kPa, and taken as it is for 60 kPa" in doubt.text
+    assert load(tmp_path, text, measured=pressed((60.2, 1.4e9))).doubts == ()
+    with pytest.raises(ConfigError, match=r"pressure_kPa = 60: two measurements of bimodal .* add a third"):
+        load(tmp_path, text, measured=pressed((50, 1.4e9), (100, 1.5e9)))
+
+
+def test_contradictions_are_said_at_once_and_in_the_outcome(tmp_path: Path) -> None:
+    found = load(tmp_path, measured=pressed((50, 1.0e9), (50, 1.8e9)))
+    (doubt,) = found.doubts
+    assert doubt.kind == "contradiction" and "contradict each other" in doubt.text
+    assert len(found.warnings) == 1 and doubt.text in found.warnings[0]
+
+
+def test_friction_may_be_fitted(tmp_path: Path) -> None:
+    text = TINY.replace("friction: 0\n", "").replace("rival_friction: [0.1]", "fit_friction: [0, 0.05, 0.3]")
+    found = load(tmp_path, text)
+    assert [p.name for p in found.parameters] == ["cohesion_kJ_m3", "friction"]
+    assert (found.parameters[1].low, found.parameters[1].high) == (0.0, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("rival_friction: [0.1]", "fit_friction: [0, 0.1]", "must hold at least 3 values"),
+        ("rival_friction: [0.1]", "fit_friction: [0, 0.1, 0.3]", "fit_friction goes without friction"),
+        ("low: 0, high: 80", "low: 80, high: 0", "low must be below high"),
+        ("step: 10", "step: 60", "step must divide the range"),
+        ("tiny_measurements.yaml", "nowhere.yaml", "no such file"),
+        ("title:", "titel:", "did you mean title?"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        load(tmp_path, TINY.replace(old, new))
+    assert said in str(error.value)
+
+
+def test_a_wide_range_is_doubted_and_one_too_wide_refused(tmp_path: Path) -> None:
+    assert not load(tmp_path).warnings
+    wide = load(tmp_path, TINY.replace("high: 80", "high: 120"))
+    assert len(wide.warnings) == 1 and wide.study.warnings == wide.warnings
+    with pytest.raises(ConfigError, match="must be at most"):
+        load(tmp_path, TINY.replace("high: 80", "high: 600"))
+
+
+def test_unknown_calibrations_are_listed(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_calibrations(["pmmma", "pmma"], ROOT / "config/calibrations", STUDIES, "config/config.yaml")
+    assert "calibrations[0] = 'pmmma': no such calibration; allowed: pmma, pmma_paper, synthetic" in str(error.value)
+
+
+def test_calibrations_of_one_name_are_refused(tmp_path: Path) -> None:
+    paths = [tmp_path / folder / "mine.yaml" for folder in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        load(path.parent)
+    with pytest.raises(ConfigError) as error:
+        load_calibrations(map(str, paths), tmp_path, STUDIES, "config/config.yaml")
+    (problem,) = error.value.problems
+    assert problem.key == "calibrations[1]"
+    assert f"{paths[0]} and {paths[1]} would both be called calibration_mine" in problem.allowed
+
+
+def test_the_name_of_a_calibration_s_file_must_be_allowed(tmp_path: Path) -> None:
+    path = tmp_path / "my file.yaml"
+    path.write_text(TINY)
+    with pytest.raises(ConfigError) as error:
+        load_calibrations([str(path)], tmp_path, STUDIES, "config/config.yaml")
+    assert "'" + str(path) + "': the file's name must be letters, digits" in str(error.value)

@@ -1,0 +1,358 @@
+"""The command line: what it prints, its one-line errors, and that no argument makes it fall over."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import shutil
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from filtercake import api
+from filtercake.api.steps import load_packing
+from filtercake.cli import commands as cli
+from filtercake.cli.commands import build_parser, main
+from filtercake.errors import ConfigError, PackingRejected
+from filtercake.packing.pack import Outcome
+
+PMMA = ["--mixture", "20:0.5,50:0.5"]
+ALUM = ["--kinetics", "ammonium_alum", "--residence-time-min", "15", "--slurry-concentration-kg-m3", "200"]
+DRUM = [
+    *["--slurry-concentration-kg-m3", "200", "--pressure-drop-kPa", "53.33", "--submerged-fraction", "0.3"],
+    *["--rotation-rate-rpm", "0.2", "--medium-resistance-1-m", "5e9"],
+]
+COMMANDS = ["csd", "pack", "porosity", "resistance", "filter-area"]
+ALL_COMMANDS = [*COMMANDS, "export", "rerun"]
+BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
+
+Capture = pytest.CaptureFixture[str]
+
+
+def as_json(arguments: list[str], capsys: Capture) -> dict[str, object]:
+    capsys.readouterr()
+    assert main([*arguments, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert isinstance(found, dict)
+    return found
+
+
+def complaint(arguments: list[str], capsys: Capture) -> str:
+    capsys.readouterr()
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("filtercake: ")
+    assert printed.err.count("\n") == 1
+    return printed.err
+
+
+def test_csd_of_a_mixture(capsys: Capture) -> None:
+    found = as_json(["csd", *PMMA], capsys)
+    assert found["sum_x_over_d_1_m"] == pytest.approx(35e3)
+    assert found["sum_x_over_d2_1_m2"] == pytest.approx(1.45e9)
+    assert found["kept_volume_fraction"] == pytest.approx(1.0)
+
+
+def test_csd_of_the_papers_crystallizer(capsys: Capture, tmp_path: Path) -> None:
+    table = tmp_path / "alum.csv"
+    found = as_json(["csd", *ALUM, "--output", str(table)], capsys)
+    assert found["packed_smallest_um"] == pytest.approx(32.5, abs=0.1)
+    assert found["packed_largest_um"] == pytest.approx(543.3, abs=0.1)
+    assert found["kept_volume_fraction"] == pytest.approx(0.981, abs=1e-3)
+    assert pd.read_csv(table)["volume_fraction"].sum() == pytest.approx(1.0)
+    again = as_json(["csd", str(table)], capsys)
+    assert again["sum_x_over_d2_1_m2"] == pytest.approx(found["sum_x_over_d2_1_m2"], rel=0.01)
+
+
+def test_csd_in_words(capsys: Capture) -> None:
+    assert main(["csd", *PMMA]) == 0
+    printed = capsys.readouterr().out
+    assert "Sauter mean diameter" in printed
+    assert "28.57 um" in printed
+
+
+def test_resistance_of_the_papers_table_4(capsys: Capture) -> None:
+    found = as_json(["resistance", "--porosity", "0.359", "--density-kg-m3", "1180", *PMMA], capsys)
+    assert found["resistance_m_kg"] == pytest.approx(3.06e9, rel=2e-3)
+    assert found["resistance_sauter_m_kg"] == pytest.approx(3.06e9 / 1.18, rel=5e-3)
+    assert found["change_per_0p01_porosity"] == pytest.approx(-0.099, abs=1e-3)
+
+
+def test_resistance_takes_the_density_of_the_kinetics(capsys: Capture) -> None:
+    found = as_json(["resistance", "--porosity", "0.293", *ALUM], capsys)
+    assert found["resistance_m_kg"] == pytest.approx(1.009e8, rel=5e-3)
+
+
+def test_filter_area_and_its_inverse(capsys: Capture) -> None:
+    area = as_json(["filter-area", "--resistance-m-kg", "1.009e8", "--slurry-flow-m3-h", "20", *DRUM], capsys)
+    assert area["filter_area_m2"] == pytest.approx(3.44, abs=5e-3)
+    assert area["medium_share"] == pytest.approx(0.51, abs=5e-3)
+    there = ["--filter-area-m2", str(area["filter_area_m2"])]
+    back = as_json(["filter-area", "--resistance-m-kg", "1.009e8", *there, *DRUM], capsys)
+    assert back["slurry_flow_m3_h"] == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["csd"], "one of FILE, --mixture and --kinetics"),
+        (["csd", "a.csv", *PMMA], "one of FILE, --mixture and --kinetics"),
+        (["csd", "no/such.csv"], "no/such.csv: cannot be read"),
+        (["csd", "--mixture", "20"], "--mixture = 20: must be sizes"),
+        (["csd", "--mixture", "20:0.5,50:0.2"], "sum to 0.7"),
+        (["csd", "--mixture", "nan:1"], "--mixture = nan: must be"),
+        (["csd", "--mixture", "1e-300:1"], "--mixture = 1e-300: must be greater than or equal to 0.001"),
+        (["csd", *PMMA, "--bin-width-um", "3"], "--bin-width-um = 3: needs"),
+        (["csd", "--kinetics", "alum", *ALUM[2:]], "--kinetics = alum: no such kinetics; allowed: ammonium_alum"),
+        (["csd", *PMMA, "--truncat-below-um", "3"], "did you mean --truncate-below-um?"),
+        (["csd", *PMMA, "--truncate-below-um", "60"], "truncation leaves no class"),
+        (["csd", *PMMA, "--output", "/dev/null/x.csv"], "/dev/null"),
+        (["resistance", "--porosity", "1.5", *PMMA], "--porosity = 1.5: must be less than or equal to 0.999"),
+        (["resistance", "--porosity", "0.4", *PMMA], "--density-kg-m3: must be given"),
+        (["resistance", *PMMA], "--porosity: must be given"),
+        (
+            ["resistance", *PMMA, "--porosity=1e-200", "--density-kg-m3=1"],
+            "--porosity = 1e-200: must be greater than or equal to 0.001",
+        ),
+        (["filter-area", "--resistance-m-kg", "1e8", *DRUM], "one of --slurry-flow-m3-h and --filter-area-m2"),
+        (["filter-area", "--resistance-m-kg", "x", *DRUM], "--resistance-m-kg = x: must be a number"),
+        (["porosity", "no/such.npz"], "cannot be read"),
+        (["porosity"], "NPZ"),
+        (["porosity", ""], "is not the name"),
+        (["csd", *PMMA, "--output", ""], "must be the name of a file"),
+        (["porosities"], "invalid choice"),
+        ([], "COMMAND"),
+    ],
+)
+def test_a_mistake_is_one_clear_line(arguments: list[str], said: str, capsys: Capture) -> None:
+    assert said in complaint(arguments, capsys)
+
+
+def test_help_lists_every_command(capsys: Capture) -> None:
+    assert main(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"\n    {command}" in printed for command in ALL_COMMANDS)
+    assert "95 % intervals" in printed and "%%" not in printed
+
+
+@pytest.mark.parametrize("command", ALL_COMMANDS)
+def test_help_names_units_and_an_example(command: str, capsys: Capture) -> None:
+    assert main([command, "--help"]) == 0
+    printed = capsys.readouterr().out
+    assert command not in COMMANDS or "um" in printed or "m3" in printed
+    assert f"filtercake {command}" in printed.split("example:")[1]
+    assert "%%" not in printed
+
+
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of two tiny packings."""
+    folder = tmp_path_factory.mktemp("packed") / "bed"
+    assert main(["pack", *BED, "--replicates", "2", "--output", str(folder)]) == 0
+    return folder
+
+
+def test_pack_prints_what_porosity_and_resistance_find_in_its_files(packed: Path, capsys: Capture) -> None:
+    before = {path.name: path.read_bytes() for path in packed.glob("r*.npz")}
+    found = as_json(["pack", *BED, "--replicates", "2", "--output", str(packed)], capsys)
+    assert found["n"] == 2
+    assert found["engine"] == "embedded"
+    assert {path.name: path.read_bytes() for path in packed.glob("r*.npz")} == before
+    measured = as_json(["porosity", *(str(packed / f"r{k}.npz") for k in (0, 1)), "--profile"], capsys)
+    assert measured["porosity"] == pytest.approx(found["porosity"])
+    assert measured["porosity_ci95"] == pytest.approx(found["porosity_ci95"])
+    law = ["--density-kg-m3", "1180", *BED[:2]]
+    alphas = []
+    for item in measured["packings"]:  # type: ignore[attr-defined]
+        filled = sum(1.0 - row["porosity"] for row in item["profile"])
+        assert filled > 0.0
+        alphas.append(as_json(["resistance", "--porosity", str(item["porosity"]), *law], capsys)["resistance_m_kg"])
+    assert found["resistance_m_kg"] == pytest.approx(np.mean(alphas))
+    assert json.loads((packed / "summary.json").read_text())["porosity"] == found["porosity"]
+
+
+def test_the_profile_adds_up_to_the_spheres(packed: Path) -> None:
+    rows = api.profile(packed / "r0.npz")
+    packing, _ = load_packing(packed / "r0.npz")
+    step = 1e-6 * (rows["height_um"][1] - rows["height_um"][0])
+    solids = float((1.0 - rows["porosity"]).sum()) * step * packing.length**2
+    assert solids == pytest.approx(4.0 / 3.0 * np.pi * float((packing.radius**3).sum()))
+
+
+def test_porosity_in_words(packed: Path, capsys: Capture) -> None:
+    assert main(["porosity", str(packed / "r0.npz"), "--profile"]) == 0
+    printed = capsys.readouterr().out
+    assert "porosity, interior" in printed
+    assert "height, um" in printed
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        (["--particles", "10"], "--particles = 10: must be greater than or equal to 50"),
+        (["--cohesion-kJ-m3", "500"], "--cohesion-kJ-m3 = 500: must be at most"),
+        (["--time-step-us", "5"], "--time-step-us = 5: must be below the Rayleigh time step"),
+        (["--engine", "magic"], "--engine = magic: allowed:"),
+        (["--replicates", "2.5"], "--replicates = 2.5: must be a whole number"),
+        (["--output", "{other}"], "must be new, empty, or a folder of packings; it holds mine.txt"),
+        (["--output", "{other}/mine.txt"], "mine.txt"),
+    ],
+)
+def test_pack_refuses_in_one_line(extra: list[str], said: str, tmp_path: Path, capsys: Capture) -> None:
+    (tmp_path / "mine.txt").touch()
+    extra = [word.format(other=tmp_path) for word in extra]
+    assert said in complaint(["pack", *BED, *extra], capsys)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_bed_that_fails_has_a_reason_and_status_1(tmp_path: Path, capsys: Capture) -> None:
+    few = ["pack", "--mixture", "20:0.01,200:0.99", "--density-kg-m3", "1180", "--particles", "50"]
+    assert main([*few, "--engine", "embedded", "--replicates", "1", "--output", str(tmp_path / "x"), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (found["n"], found["n_failed"], found["porosity"]) == (0, 1, None)
+    assert "r0: " in found["failures"][0]
+
+
+def test_version(capsys: Capture) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("filtercake ")
+
+
+def test_units_are_accepted_in_small_letters(capsys: Capture) -> None:
+    small = [word.lower() if word.startswith("--") else word for word in DRUM]
+    assert as_json(["filter-area", "--resistance-m-kg", "1e8", "--slurry-flow-m3-h", "20", *small], capsys)
+
+
+def test_a_bug_is_one_line_and_its_traceback_is_for_the_asking(
+    monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    def broken(**_: object) -> None:
+        raise RuntimeError("two\nlines")
+
+    monkeypatch.setattr(api, "distribution", broken)
+    assert main(["csd", *PMMA]) == 1
+    assert "unexpected RuntimeError: two lines" in capsys.readouterr().err
+    monkeypatch.setenv(cli.TRACEBACK_VARIABLE, "1")
+    with pytest.raises(RuntimeError):
+        main(["csd", *PMMA])
+
+
+def test_the_api_names_every_problem_at_once() -> None:
+    with pytest.raises(ConfigError) as caught:
+        api.filter_area(resistance_m_kg=-1, pressure_drop_kPa=50)
+    assert {"resistance_m_kg", "submerged_fraction"} <= {problem.key for problem in caught.value.problems}
+
+
+def test_a_file_that_is_no_packing_is_refused(tmp_path: Path) -> None:
+    npz = tmp_path / "r0.npz"
+    npz.write_bytes(b"nothing")
+    with pytest.raises(PackingRejected, match="cannot be read"):
+        api.porosity(npz)
+    npz.with_suffix(".json").write_text('{"sha256": 3}', encoding="utf-8")
+    with pytest.raises(PackingRejected, match="checksum"):
+        api.porosity(npz)
+
+
+PARSERS = build_parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+OPTIONS = {
+    command: sorted(
+        name
+        for action in PARSERS[command]._actions  # type: ignore[index, call-overload]
+        for name in action.option_strings
+        if action.dest not in ("output", "help")
+    )
+    for command in COMMANDS
+}
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True).map(repr) | st.integers().map(str)
+WORDS = st.text(st.characters(exclude_characters="\0"), max_size=8) | NUMBERS
+PAIRS = st.lists(st.tuples(NUMBERS, NUMBERS).map(":".join), max_size=3).map(",".join)
+GOOD = st.sampled_from(["0.3", "20:0.5,50:0.5", "1e8", "15", "200", "ammonium_alum", "5", "1180", "53.3"])
+
+
+def arguments_of(command: str) -> st.SearchStrategy[list[str]]:
+    """Options of a command, mostly its own, with values good and bad."""
+    option = st.sampled_from(OPTIONS[command]) | st.sampled_from(sorted({*chain(*OPTIONS.values())}))
+    pair = st.tuples(option, GOOD | WORDS | PAIRS).map("=".join) | st.sampled_from(["--json", "--profile"])
+    return st.lists(pair, max_size=8).map(lambda words: [command, *words])
+
+
+ARGUMENTS = st.sampled_from(COMMANDS).flatmap(arguments_of)
+
+
+@pytest.fixture(scope="module")
+def no_settling(packed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Let ``pack`` take packings that are there, whatever is asked for; gives a folder to write to."""
+    shelf = tmp_path_factory.mktemp("shelf")
+
+    def take(point: object, csd: object, folder: Path, say: object) -> list[Outcome]:
+        shutil.copytree(packed, folder, dirs_exist_ok=True)
+        return [Outcome(k, "ok", "", 1, "", 1) for k in (0, 1)]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(importlib.import_module("filtercake.api.pack"), "_make", take)
+        patch.chdir(shelf)
+        yield shelf
+
+
+@given(arguments=ARGUMENTS, more=st.lists(WORDS, max_size=2))
+def test_no_argument_makes_it_fall_over(no_settling: Path, arguments: list[str], more: list[str]) -> None:
+    assert main([*arguments, *more]) in (0, 2)
+
+
+@given(option=st.sampled_from(OPTIONS["pack"]), value=GOOD | WORDS)
+def test_no_option_of_pack_makes_it_fall_over(no_settling: Path, option: str, value: str) -> None:
+    assert main(["pack", *BED, option if option in ("--json", "--write-vtk") else f"{option}={value}"]) in (0, 2)
+
+
+@given(
+    values=st.lists(st.tuples(st.floats(), st.floats()), min_size=1, max_size=4),
+    cut=st.floats(),
+    below=st.floats(),
+)
+def test_no_mixture_makes_it_fall_over(values: list[tuple[float, float]], cut: float, below: float) -> None:
+    mixture = ",".join(f"{size!r}:{share!r}" for size, share in values)
+    cuts = [f"--truncate-below-volume-fraction={cut!r}", f"--truncate-below-um={below!r}"]
+    for extra in ([], cuts):
+        assert main(["csd", "--json", f"--mixture={mixture}", *extra]) in (0, 2)
+
+
+@given(
+    size=st.floats(min_value=1e-320, max_value=1e5),
+    share=st.floats(min_value=0.0, max_value=1.0),
+    other=st.floats(min_value=1e-12, max_value=1e5),
+    porosity=st.floats(min_value=0.0, max_value=1.0),
+    density=st.floats(min_value=1e-320, max_value=25_000),
+)
+def test_no_numbers_within_their_ranges_make_it_fall_over(
+    size: float, share: float, other: float, porosity: float, density: float
+) -> None:
+    mixture = f"--mixture={size!r}:{share!r},{other!r}:{1.0 - share!r}"
+    cake = [f"--porosity={porosity!r}", f"--density-kg-m3={density!r}"]
+    assert main(["resistance", "--json", mixture, *cake]) in (0, 2)
+
+
+@given(
+    values=st.lists(st.floats(min_value=0.0, max_value=1e7), min_size=7, max_size=7),
+    inverse=st.booleans(),
+)
+def test_no_filter_makes_it_fall_over(values: list[float], inverse: bool) -> None:
+    names = [name for name in DRUM if name.startswith("--")]
+    names += ["--resistance-m-kg", "--filter-area-m2" if inverse else "--slurry-flow-m3-h"]
+    assert main(["filter-area", *(f"{name}={value!r}" for name, value in zip(names, values, strict=True))]) in (0, 2)
+
+
+@given(
+    width=st.floats(min_value=1e-9, max_value=1000),
+    time=st.floats(min_value=1e-9, max_value=1e5),
+    slurry=st.floats(min_value=1e-9, max_value=2000),
+)
+def test_no_crystallizer_makes_it_fall_over(width: float, time: float, slurry: float) -> None:
+    values = [f"--bin-width-um={width!r}", f"--residence-time-min={time!r}", f"--slurry-concentration-kg-m3={slurry!r}"]
+    assert main(["csd", "--json", "--kinetics", "potassium_nitrate", *values]) in (0, 2)

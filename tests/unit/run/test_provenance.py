@@ -1,0 +1,171 @@
+"""Which library files a rule depends on, and what a run says about its origin."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy
+import pytest
+
+from filtercake.run import provenance
+from filtercake.run.provenance import ROOT, code_hash, describe, packing_sources, sources, versions
+
+
+def names(module: str) -> set[str]:
+    return {str(path.relative_to(ROOT)) for path in sources(module)}
+
+
+@pytest.fixture
+def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A made-up library: top -> middle -> ground, and a module beside them."""
+    root = tmp_path / "filtercake"
+    (root / "inner").mkdir(parents=True)
+    for name, text in {
+        "__init__.py": "",
+        "inner/__init__.py": "",
+        "top.py": "from filtercake import middle\nimport json\n",
+        "middle.py": "def late():\n    import filtercake.inner.ground as g\n    return g\n",
+        "inner/ground.py": "from filtercake.inner.loop import x\n",
+        "inner/loop.py": "from filtercake.inner.ground import y\n",
+        "beside.py": "from filtercake.top import z\n",
+    }.items():
+        (root / name).write_text(text, encoding="utf-8")
+    monkeypatch.setattr(provenance, "ROOT", root)
+    provenance.sources.cache_clear()
+    yield root
+    provenance.sources.cache_clear()
+
+
+def test_imports_are_followed_through_modules_and_circles(library: Path) -> None:
+    found = {str(path.relative_to(library)) for path in sources("top")}
+    assert found == {"__init__.py", "top.py", "middle.py", "inner/__init__.py", "inner/ground.py", "inner/loop.py"}
+
+
+def test_modules_above_are_left_out(library: Path) -> None:
+    found = {str(path.relative_to(library)) for path in sources("inner.ground")}
+    assert found == {"__init__.py", "inner/__init__.py", "inner/ground.py", "inner/loop.py"}
+
+
+def test_a_missing_module_is_an_error(library: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"no module 'inner\.nothing'"):
+        sources("inner.nothing")
+
+
+def test_packing_depends_on_its_engines_and_not_on_studies_and_figures() -> None:
+    found = names("packing.pack")
+    assert {
+        "__init__.py",
+        "packing/__init__.py",
+        "packing/pack.py",
+        "packing/cloud.py",
+        "packing/accept.py",
+        "packing/contacts.py",
+        "packing/settling.py",
+        "packing/engines/__init__.py",
+        "packing/engines/liggghts.py",
+        "packing/engines/liggghts_log.py",
+        "packing/engines/process.py",
+        "packing/engines/micro.py",
+        "packing/contact_law.py",
+        "crystals/csd.py",
+        "errors.py",
+        "units.py",
+    } <= found
+    assert "packing/porosity.py" not in found
+    assert {name.split("/")[0] for name in found if "/" in name} == {"packing", "crystals"}
+
+
+def test_lower_floors_import_nothing_from_above() -> None:
+    assert names("units") == {"__init__.py", "units.py"}
+    assert names("errors") == {"__init__.py", "errors.py"}
+    rooms = {"crystals/__init__.py", "crystals/csd.py", "filtration/__init__.py", "filtration/resistance.py"}
+    assert names("filtration.resistance") == rooms | {"__init__.py", "errors.py", "units.py", "user_files.py"}
+
+
+@pytest.mark.parametrize("module", ["packing.pack", "crystals.csd", "packing.porosity", "study.points"])
+def test_what_python_really_imports_is_in_the_list(module: str) -> None:
+    code = (
+        f"import sys, filtercake.{module}\n"
+        "print(*[m.__file__ for n, m in sys.modules.items() if n.split('.')[0] == 'filtercake'], sep='\\n')"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    imported = {Path(line).resolve() for line in run.stdout.splitlines()}
+    assert imported <= set(sources(module))
+
+
+def test_a_hash_follows_contents_not_places(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+    a, b = tmp_path / "one" / "a.py", tmp_path / "one" / "b.py"
+    a.write_text("x = 1\n", encoding="utf-8")
+    b.write_text("y = 1\n", encoding="utf-8")
+    first = code_hash([a, b])
+    assert code_hash((b, a)) == first
+    shutil.copy(a, tmp_path / "two" / "a.py")
+    assert code_hash([tmp_path / "two" / "a.py", b]) == first
+    a.write_text("x = 2\n", encoding="utf-8")
+    assert code_hash([a, b]) != first
+    assert code_hash([b]) != first
+
+
+def test_versions_name_every_package_even_a_missing_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(provenance, "PACKAGES", ("numpy", "no-such-package-at-all"))
+    found = versions()
+    assert found["no-such-package-at-all"] == "not installed"
+    assert found["numpy"] == numpy.__version__
+    assert found["python"].startswith(f"{sys.version_info.major}.{sys.version_info.minor}")
+
+
+def test_a_description_is_json_and_survives_a_folder_without_git(tmp_path: Path) -> None:
+    found = json.loads(json.dumps(describe(tmp_path)))
+    assert found["commit"] == "unknown"
+    assert set(found) == {"versions", "machine", "commit"}
+
+
+def test_the_commit_is_the_repository_s(tmp_path: Path) -> None:
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=t", "-c", "user.email=t@t"]
+    subprocess.run([*git, "init", "-q"], check=True)
+    (tmp_path / "f").write_text("1", encoding="utf-8")
+    subprocess.run([*git, "add", "f"], check=True)
+    subprocess.run([*git, "commit", "-qm", "m"], check=True)
+    head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True).stdout.strip()
+    commit = describe(tmp_path)["commit"]
+    assert head.startswith(commit)
+    (tmp_path / "f").write_text("2", encoding="utf-8")
+    assert describe(tmp_path)["commit"] == f"{commit}-dirty"
+
+
+@pytest.mark.parametrize(
+    ("engine", "own", "others"),
+    [
+        ("embedded", {"embedded.py", "embedded_bed.py", "embedded_kernels.py"}, {"liggghts.py", "liggghts_log.py"}),
+        ("liggghts", {"liggghts.py", "liggghts_log.py", "process.py", "micro.py"}, {"embedded.py", "embedded_bed.py"}),
+        ("liggghts_as_published", {"liggghts_as_published.py", "liggghts.py"}, {"embedded_kernels.py"}),
+    ],
+)
+def test_packings_depend_on_their_own_engine_only(engine: str, own: set[str], others: set[str]) -> None:
+    found = {path.name for path in packing_sources(engine)}
+    assert own | {"base.py", "pack.py", "cloud.py", "accept.py", "settling.py", "contact_law.py"} <= found
+    assert not others & found
+
+
+def test_an_unknown_engine_has_no_files() -> None:
+    with pytest.raises(FileNotFoundError, match="no engine 'magic'"):
+        packing_sources("magic")
+
+
+def test_a_file_behind_many_modules_is_parsed_once(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed = []
+    parse = provenance.ast.parse
+    with monkeypatch.context() as patch:  # pytest parses as well
+        patch.setattr(provenance.ast, "parse", lambda text: parsed.append(text) or parse(text))
+        for module in ("top", "middle", "beside", "inner.ground"):
+            sources(module)
+    assert len(parsed) == 7  # every file once

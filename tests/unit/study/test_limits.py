@@ -1,0 +1,99 @@
+"""What the fence refuses and warns about, by its own limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from filtercake.packing import contact_law
+from filtercake.study import limits
+
+RAYLEIGH = contact_law.rayleigh_time_step(10e-6, 1180.0, 5e6, 0.2)
+SCENE = limits.Numbers(
+    smallest=20e-6,
+    density=1180.0,
+    youngs_modulus=5e6,
+    poisson_ratio=0.2,
+    restitution=0.3,
+    friction=0.0,
+    cohesion=50e3,
+    time_step=limits.FRICTIONLESS_TIME_STEP * RAYLEIGH,
+)
+
+
+def test_the_papers_scene_passes_without_a_word() -> None:
+    assert limits.verdict(SCENE) == "allowed"
+    assert not list(limits.refusals(SCENE))
+    assert not list(limits.doubts(SCENE))
+
+
+def test_defaults_are_inside() -> None:
+    for friction in (0.0, 0.05, 0.3, 1.0):
+        scene = replace(SCENE, friction=friction, time_step=limits.default_time_step(friction) * RAYLEIGH)
+        assert limits.verdict(scene) == "allowed"
+
+
+@pytest.mark.parametrize(
+    ("changed", "key", "says"),
+    [
+        ({"cohesion": 250e3}, "cohesion", "must be at most 206 kJ/m3 at E = 5 MPa, nu = 0.2"),
+        ({"youngs_modulus": 1e6}, "cohesion", "must be at most 41 kJ/m3 at E = 1 MPa"),
+        ({"density": 118e3, "time_step": 3e-6}, "density", "at most 25000 kg/m3"),
+        ({"time_step": 1.01 * RAYLEIGH}, "time_step", "Rayleigh time step 0.8223 us"),
+    ],
+)
+def test_outside_is_refused(changed: dict[str, float], key: str, says: str) -> None:
+    scene = replace(SCENE, **changed)
+    found = [finding for finding in limits.refusals(scene) if finding.key == key]
+    assert len(found) == 1
+    assert says in found[0].text
+    assert limits.PAGE in found[0].text
+    assert limits.verdict(scene) == "refused"
+
+
+def test_restitution_too_small_for_liggghts_is_refused_with_that_engine_alone() -> None:
+    scene = replace(SCENE, restitution=0.05)
+    (finding,) = limits.refusals(replace(scene, engine="liggghts"))
+    assert finding.key == "restitution"
+    assert "engine: embedded" in finding.text and limits.PAGE in finding.text
+    assert limits.verdict(replace(scene, engine="liggghts", restitution=0.051)) == "allowed"
+    assert limits.verdict(replace(scene, engine="embedded")) == limits.verdict(scene) == "allowed"
+
+
+@pytest.mark.parametrize(
+    ("changed", "key", "says"),
+    [
+        ({"restitution": 0.96}, "restitution", "hardly come to rest"),
+    ],
+)
+def test_what_may_not_end_well_is_warned_about(changed: dict[str, float], key: str, says: str) -> None:
+    (finding,) = limits.doubts(replace(SCENE, **changed))
+    assert finding.key == key
+    assert says in finding.text
+    assert limits.PAGE in finding.text
+
+
+@pytest.mark.parametrize(
+    ("changed", "limit", "says"),
+    [
+        ({"friction": 0.05}, 0.36, "with friction"),
+        ({"cohesion": 150e3}, 0.5, "overlap by 1.8% of the diameter"),
+        ({"restitution": 0.06}, 0.5, "a restitution under 0.1"),
+    ],
+)
+def test_some_scenes_take_shorter_steps(changed: dict[str, float], limit: float, says: str) -> None:
+    scene = replace(SCENE, **changed)
+    (finding,) = limits.refusals(replace(scene, time_step=(limit + 0.01) * RAYLEIGH))
+    assert finding.key == "time_step"
+    assert f"at most {limit:g} of the Rayleigh time step 0.8223 us" in finding.text and says in finding.text
+    assert limits.PAGE in finding.text
+    assert limits.verdict(replace(scene, time_step=limit * RAYLEIGH)) != "refused"
+
+
+def test_soft_contacts_are_warned_about() -> None:
+    scene = replace(SCENE, cohesion=150e3)
+    (finding,) = limits.doubts(scene)
+    assert finding.key == "cohesion"
+    assert "1.8% of the diameter" in finding.text  # (150/50)^2 * 0.205 %
+    assert limits.verdict(scene) == "warned"

@@ -1,0 +1,159 @@
+"""The stress tests' own machinery: cases, outcomes, conservation, and what counts as undetected."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from filtercake.packing.cloud import Cloud
+from filtercake.packing.result import SettledState
+from filtercake.packing.settling import Trajectory
+from filtercake.units import GRAVITY
+from filtercake.validation import stability
+from filtercake.validation.stability import (
+    Case,
+    Scene,
+    cases,
+    distribution,
+    energy_gain,
+    momentum_drift,
+    run,
+    spec_of,
+    undetected,
+)
+
+ENGINES = ("embedded", "liggghts")
+
+
+def case(engine: str = "embedded", time_step: float = 0.0, **scene: float) -> Case:
+    return Case("test", engine, "time_step", time_step, "friction", 0.0, Scene(**scene), time_step=time_step)
+
+
+def test_there_are_enough_cases_and_no_two_are_the_same() -> None:
+    listed = cases(ENGINES)
+    assert len(listed) >= 150
+    assert len({(c.family, c.engine, c.x, c.y) for c in listed}) == len(listed)
+    assert {c.family for c in listed} == set(stability.families())
+
+
+def test_without_liggghts_only_the_embedded_engine_is_stressed() -> None:
+    assert {c.engine for c in cases(["embedded"])} == {"embedded"}
+    assert {c.engine for c in cases(ENGINES)} == {"embedded", "liggghts", "liggghts_si"}
+
+
+def test_the_stress_reaches_as_far_as_asked() -> None:
+    scenes = [c.scene for c in cases(ENGINES)]
+    steps = [c.time_step for c in cases(ENGINES) if c.time_step]
+    assert (min(steps), max(steps)) == (0.02, 2.0)
+    for name, low, high in (
+        ("cohesion_kJ_m3", 0, 500),
+        ("youngs_modulus_MPa", 0.5, 500),
+        ("restitution", 0.01, 0.99),
+        ("friction", 0, 2),
+        ("size_ratio", 1, 50),
+        ("drop_height", 1, 10),
+    ):
+        values = [getattr(scene, name) for scene in scenes]
+        assert (min(values), max(values)) == (low, high), name
+    assert max(scene.density_kg_m3 for scene in scenes) == 100 * 1180.0
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.5, 5.0, 10.0, 20.0, 50.0])
+def test_every_width_has_its_large_spheres(ratio: float) -> None:
+    csd, particles, _ = distribution(ratio)
+    assert csd.largest / csd.smallest == pytest.approx(ratio)
+    counts = csd.class_counts(particles)
+    assert counts.sum() == particles
+    assert counts.min() >= (1 if ratio == 1.0 else stability.LARGE_SPHERES)
+
+
+def test_a_higher_drop_is_a_faster_start() -> None:
+    low, high = (spec_of(case(drop_height=times))[0] for times in (1.0, 10.0))
+    cloud_height = (high.settling_velocity**2 - low.settling_velocity**2) / (2.0 * GRAVITY) / 9.0
+    assert 4e-4 < cloud_height < 6e-4  # twice the box side of 1000 spheres, 0.22 mm
+    assert high.max_fall_times == 10 * low.max_fall_times
+
+
+def test_outcomes_of_a_safe_a_wild_and_a_refused_case(monkeypatch) -> None:
+    monkeypatch.setattr(stability, "PARTICLES", 400)
+    table = run([case(), case(time_step=2.0), case(youngs_modulus_MPa=0.5, cohesion_kJ_m3=100.0)], replicates=2)
+    safe, wild, soft = table.to_dict("records")
+    assert safe["outcome"] in ("ok", "inaccurate")
+    assert safe["n_accepted"] == 2
+    assert safe["momentum_drift"] < 1e-10
+    assert 0.0 <= safe["energy_gain"] < 0.01
+    assert wild["outcome"] == "exploded"
+    assert wild["n_accepted"] == 0
+    assert "shorter time step" in wild["reason"]
+    assert soft["outcome"] in ("unsettled", "refused", "exploded")
+
+
+def test_one_accepted_packing_of_many_is_no_success(monkeypatch) -> None:
+    results = iter([stability._Try("ok", porosity=0.35), stability._Try("unsettled", "still moving")] * 3)
+    monkeypatch.setattr(stability, "_try", lambda *_: next(results))
+    row = stability._judge(case(), [0.35, 0.351], 4)
+    assert row["outcome"] == "unsettled"
+    assert (row["n"], row["n_accepted"]) == (4, 2)
+    assert row["reason"] == "still moving"
+
+
+def test_what_never_rests_is_not_tried_for_ever(monkeypatch) -> None:
+    monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("unsettled", "still moving"))
+    row = stability._judge(case(), [0.35, 0.351], 10)
+    assert (row["n"], row["n_accepted"], row["outcome"]) == (stability.HOPELESS, 0, "unsettled")
+    assert stability._reference(Scene(), 10) == []
+
+
+def test_a_bias_beyond_its_uncertainty_is_inaccurate(monkeypatch) -> None:
+    values = iter([0.360, 0.3601, 0.3599, 0.360])
+    monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("ok", porosity=next(values)))
+    row = stability._judge(case(), [0.350, 0.3501, 0.3499], 4)
+    assert row["outcome"] == "inaccurate"
+    assert row["bias"] == pytest.approx(0.01)
+
+
+def state(height: list[float], energy: list[float], velocity: np.ndarray) -> SettledState:
+    steps = np.arange(len(height), dtype=float)
+    record = Trajectory(steps, np.array(height), np.array(energy), np.zeros(len(height)))
+    radius = np.full(len(velocity), 1e-5)
+    return SettledState(velocity * 0, velocity, radius, 1e-4, record, 1, len(radius), 0, "embedded", "")
+
+
+def test_energy_that_appears_is_seen() -> None:
+    spec, _ = spec_of(case())
+    cloud = Cloud(np.full((2, 3), 5e-5), np.full(2, 1e-5), 1e-4, 2e-4)
+    weight = 2 * spec.density * 4 / 3 * np.pi * 1e-15 * GRAVITY
+    still = np.zeros((2, 3))
+    falling = state([1e-4, 5e-5, 5e-5], [0.0, weight * 5e-5, 0.0], still)
+    assert energy_gain(falling, spec, cloud) == pytest.approx(0.0, abs=1e-12)
+    fed = state([1e-4, 5e-5, 5e-5], [0.0, 0.0, weight * 2e-5], still)
+    assert energy_gain(fed, spec, cloud) == pytest.approx(0.2)
+    assert math.isinf(energy_gain(state([1e-4, math.nan], [0.0, 0.0], still), spec, cloud))
+
+
+def test_sideways_drift_is_that_of_the_centre_of_mass() -> None:
+    velocity = np.array([[0.3, 0.4, -9.0], [0.3, 0.4, 9.0]])
+    assert momentum_drift(state([1.0, 1.0], [0.0, 0.0], velocity)) == pytest.approx(0.5)
+    assert momentum_drift(state([1.0, 1.0], [0.0, 0.0], velocity * [[1], [-1]])) == pytest.approx(0.0)
+
+
+def test_the_fence_knows_what_liggghts_does_not_take() -> None:
+    listed = [c for c in cases(ENGINES) if (c.family, c.scene.restitution, c.y) == ("restitution_time_step", 0.01, 0.5)]
+    table = pd.DataFrame([{"family": c.family, "engine": c.engine, "x": c.x, "y": c.y} for c in listed])
+    found = stability.with_fence(table)
+    assert dict(zip(found["engine"], found["fence"], strict=True)) == {"embedded": "allowed", "liggghts": "refused"}
+
+
+def test_undetected_is_wrong_accepted_and_unannounced() -> None:
+    rows = [
+        (0.010, 0.001, 3, "allowed"),
+        (0.010, 0.001, 3, "warned"),
+        (0.010, 0.001, 0, "allowed"),
+        (0.010, 0.004, 3, "allowed"),
+        (-0.010, 0.001, 3, "allowed"),
+    ]
+    table = pd.DataFrame(rows, columns=["bias", "bias_se", "n_accepted", "fence"])
+    assert list(undetected(table).index) == [0, 4]
