@@ -23,7 +23,8 @@ from filtercake.errors import (
     Problem,
     shown,
 )
-from filtercake.study.config import MOST_DISTRIBUTIONS, MOST_POINTS, Workflow
+from filtercake.study.config.study import MOST_DISTRIBUTIONS, Workflow
+from filtercake.study.config.values import MOST_POINTS
 from filtercake.study.loading import LoadedStudy, find_studies, load_study, load_workflow, parse
 from filtercake.user_files import read_yaml
 

@@ -10,7 +10,7 @@ from filtercake.packing.result import read_record
 from filtercake.report import captions, pages
 from filtercake.run.job import job
 from filtercake.run.provenance import describe
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 
 NAMES = {"csd": str, "point": str}
 

@@ -9,7 +9,7 @@ from filtercake.crystals.csd import from_table
 from filtercake.packing.result import publish
 from filtercake.results.paper_tables import crystallizer_table
 from filtercake.run.job import job
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 
 with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
     study = Study.model_validate(snakemake.params.study)

@@ -8,7 +8,7 @@ from filtercake.crystals.csd import from_table
 from filtercake.packing.result import publish
 from filtercake.results.filter_design import filter_design
 from filtercake.run.job import job
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 
 with job(snakemake.log[0], snakemake.output) as log, publish(Path(snakemake.output[0])) as temporary:
     study = Study.model_validate(snakemake.params.study)

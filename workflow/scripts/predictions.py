@@ -6,7 +6,7 @@ from filtercake.calibration.rounds import Task, conclude, prediction_table
 from filtercake.packing.result import publish, read_record
 from filtercake.results.filter_design import drum_of
 from filtercake.run.job import job
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 from filtercake.units import HOUR
 
 

@@ -26,7 +26,7 @@ from filtercake.packing.scene import PackingSpec, stage_seed
 from filtercake.packing.settling import StopRule
 from filtercake.run.provenance import ROOT, describe
 from filtercake.study import engine_choice
-from filtercake.study.config import NAME
+from filtercake.study.config.values import NAME
 from filtercake.study.loading import LoadedStudy, load_study
 from filtercake.study.points import Point, expand
 

@@ -22,7 +22,7 @@ from filtercake.packing.result import write_json
 from filtercake.results.replicates import REPLICATE_COLUMNS, failed_row, replicate_row, summarise
 from filtercake.run.provenance import code_hash, packing_sources, versions
 from filtercake.study import engine_choice
-from filtercake.study.config import Material
+from filtercake.study.config.material import Material
 from filtercake.study.points import Point, base_point
 from filtercake.units import MICROSECOND
 

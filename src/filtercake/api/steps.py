@@ -33,7 +33,8 @@ from filtercake.packing.porosity import measure, porosity_profile
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import PackingSpec
 from filtercake.packing.slab import bed_height
-from filtercake.study.config import TO_NUMBER, Density, Filter, Model
+from filtercake.study.config.filter import Filter
+from filtercake.study.config.values import TO_NUMBER, Density, Model
 from filtercake.study.loading import LoadedStudy, check_study, parse
 from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
 

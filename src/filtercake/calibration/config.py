@@ -26,21 +26,20 @@ from filtercake.errors import ConfigError, Problem, shown
 from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.filtration.resistance import implied_porosity
 from filtercake.packing import contact_law
-from filtercake.study.config import (
-    MOST_DISTRIBUTIONS,
+from filtercake.study.config.packing import EngineName
+from filtercake.study.config.study import MOST_DISTRIBUTIONS, Workflow
+from filtercake.study.config.sweep import Sweep
+from filtercake.study.config.values import (
     MOST_POINTS,
     NAME,
     TO_NUMBER,
     TO_TEXT,
     TO_WHOLE,
     Cohesion,
-    EngineName,
     Friction,
     Model,
     Name,
     PathText,
-    Sweep,
-    Workflow,
 )
 from filtercake.study.limits import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
 from filtercake.study.loading import LoadedStudy, find_studies, load_study, parse

@@ -28,7 +28,7 @@ from filtercake.filtration.constant_pressure import (
     fit_differential,
     fit_integral,
 )
-from filtercake.study.config import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText
+from filtercake.study.config.values import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText
 from filtercake.study.loading import parse
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, NUMBER, FloatArray, IntArray
 from filtercake.user_files import Unusable, read_text, read_yaml

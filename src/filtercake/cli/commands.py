@@ -21,7 +21,8 @@ from filtercake.errors import CloudError, EngineError, EngineMissing, Filtercake
 from filtercake.packing.replication import half_width
 from filtercake.packing.result import publish
 from filtercake.study import engine_choice
-from filtercake.study.config import Material, Packing
+from filtercake.study.config.material import Material
+from filtercake.study.config.packing import Packing
 from filtercake.study.estimate import estimate
 from filtercake.study.loading import load_study
 from filtercake.study.points import expand

@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 from filtercake.api.steps import ORIGIN
 from filtercake.cli.schema import allowed, meaning
 from filtercake.errors import ConfigError, FiltercakeError, Problem
-from filtercake.study.config import Crystallizer, Csd
+from filtercake.study.config.crystals import Crystallizer, Csd
 
 SOURCE_FIELDS: tuple[tuple[type[BaseModel], tuple[str, ...]], ...] = (
     (Crystallizer, ("kinetics", "kinetics_file", "slurry_concentration_kg_m3")),

@@ -16,18 +16,13 @@ from pydantic.fields import FieldInfo
 
 from filtercake.calibration.config import Calibration, CohesionRange
 from filtercake.calibration.measurements import ConstantPressureTest, KnownResistance, MeasurementFile
-from filtercake.study.config import (
-    Crystallizer,
-    Csd,
-    Filter,
-    Material,
-    Packing,
-    Published,
-    SizeClass,
-    Study,
-    Sweep,
-    Workflow,
-)
+from filtercake.study.config.crystals import Crystallizer, Csd, SizeClass
+from filtercake.study.config.filter import Filter
+from filtercake.study.config.material import Material
+from filtercake.study.config.packing import Packing
+from filtercake.study.config.published import Published
+from filtercake.study.config.study import Study, Workflow
+from filtercake.study.config.sweep import Sweep
 
 EXAMPLES = {
     "kinetics": "ammonium_alum",

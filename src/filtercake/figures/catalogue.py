@@ -15,7 +15,7 @@ import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution, from_table
 from filtercake.packing.result import publish
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 from filtercake.study.points import Point
 
 if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from filtercake.figures import selection, style
 from filtercake.filtration.resistance import kozeny_carman
-from filtercake.study.config import Published
+from filtercake.study.config.published import Published
 
 if TYPE_CHECKING:
     from filtercake.figures.catalogue import StudyData

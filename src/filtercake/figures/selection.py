@@ -11,7 +11,7 @@ import pandas as pd
 from filtercake.crystals.crystallizer import SteadyState
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
-from filtercake.study.config import Published
+from filtercake.study.config.published import Published
 from filtercake.study.points import base_rows
 from filtercake.units import LITRE, MICROMETRE, MINUTE
 

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
-from filtercake.study.config import Published
+from filtercake.study.config.published import Published
 from filtercake.units import FloatArray
 
 SINGLE, MEDIUM, DOUBLE = 3.5, 5.0, 7.0

@@ -14,7 +14,7 @@ from filtercake.units import MICROMETRE, FloatArray
 
 if TYPE_CHECKING:
     from filtercake.figures.catalogue import StudyData
-    from filtercake.study.config import Csd
+    from filtercake.study.config.crystals import Csd
 
 MOST_PANELS = 4
 KEPT, DISCARDED = style.colour(0), style.colour(1)

@@ -17,7 +17,7 @@ from filtercake.figures.porosity_cohesion import FREE
 from filtercake.packing.result import publish
 from filtercake.report.pages import engine_names, environment
 from filtercake.report.words import heading, number, with_interval
-from filtercake.study.config import SWEPT
+from filtercake.study.config.sweep import SWEPT
 
 SUFFIX, FRONT = ".html.j2", "front"
 

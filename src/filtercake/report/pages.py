@@ -15,7 +15,7 @@ from filtercake.figures import style
 from filtercake.packing.result import publish
 from filtercake.report import words
 from filtercake.report.catalogue import PAGES
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 
 FAILED_COLUMNS = ("point", "replicate", "csd", "cohesion_kJ_m3", "friction", "engine", "reason")
 

@@ -8,7 +8,7 @@ import pandas as pd
 from filtercake.errors import FilterError
 from filtercake.filtration.drum_filter import Cake, DrumFilter, area, design_table
 from filtercake.results.paper_tables import Csds, published_value
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
 
 

@@ -13,7 +13,8 @@ from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.errors import CrystallizerError
 from filtercake.filtration.resistance import kozeny_carman
 from filtercake.packing.cloud import box_length
-from filtercake.study.config import Published, Study
+from filtercake.study.config.published import Published
+from filtercake.study.config.study import Study
 from filtercake.study.points import base_rows, bed_of
 from filtercake.units import HOUR, LITRE, MICROMETRE, MINUTE, tidy
 

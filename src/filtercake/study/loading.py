@@ -18,18 +18,11 @@ from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, Csd
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import bed_for
 from filtercake.study import limits
-from filtercake.study.config import (
-    MOST_DISTRIBUTIONS,
-    MOST_PARTICLES,
-    MOST_POINTS,
-    NAME,
-    SWEPT,
-    Crystallizer,
-    Csd,
-    Packing,
-    Study,
-    Workflow,
-)
+from filtercake.study.config.crystals import Crystallizer, Csd
+from filtercake.study.config.packing import Packing
+from filtercake.study.config.study import MOST_DISTRIBUTIONS, Study, Workflow
+from filtercake.study.config.sweep import SWEPT
+from filtercake.study.config.values import MOST_PARTICLES, MOST_POINTS, NAME
 from filtercake.study.products import resolve, slurry_problems
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
 from filtercake.user_files import is_file, read_yaml

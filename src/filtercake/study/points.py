@@ -15,7 +15,9 @@ from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import BedSize, bed_for
 from filtercake.packing.scene import PackingSpec, digest
-from filtercake.study.config import SWEPT, Packing, Study, Sweep
+from filtercake.study.config.packing import Packing
+from filtercake.study.config.study import Study
+from filtercake.study.config.sweep import SWEPT, Sweep
 from filtercake.study.loading import LoadedStudy
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE, tidy
 

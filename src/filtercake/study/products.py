@@ -7,7 +7,11 @@ from pathlib import Path
 
 from filtercake.crystals.crystallizer import Kinetics, get_kinetics, load_kinetics
 from filtercake.errors import ConfigError, CrystallizerError, Problem
-from filtercake.study.config import Crystallizer, Csd, Material, Published, Study, Sweep
+from filtercake.study.config.crystals import Crystallizer, Csd
+from filtercake.study.config.material import Material
+from filtercake.study.config.published import Published
+from filtercake.study.config.study import Study
+from filtercake.study.config.sweep import Sweep
 from filtercake.units import MINUTE
 
 SETTLED_SOLIDS = 0.35

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.packing.replication import half_width
-from filtercake.study.config import SWEPT
+from filtercake.study.config.sweep import SWEPT
 
 STANDARD_ERRORS = 2.0
 """Combined standard errors within which two means agree."""

@@ -24,7 +24,7 @@ from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import Slab, bed_height, interior_slab
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
-from filtercake.study.config import Study
+from filtercake.study.config.study import Study
 
 pytestmark = pytest.mark.filterwarnings("error")
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from filtercake.errors import ConfigError, Problem
 from filtercake.packing.cloud import BedSize
 from filtercake.study import engine_choice
-from filtercake.study.config import Study, Workflow
+from filtercake.study.config.study import Study, Workflow
 from filtercake.study.loading import find_studies, load_studies, load_study, load_workflow, read_yaml
 from filtercake.study.points import bed_of, expand
 

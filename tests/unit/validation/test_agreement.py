@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from filtercake.packing.replication import half_width
-from filtercake.study.config import SWEPT
+from filtercake.study.config.sweep import SWEPT
 from filtercake.validation.agreement import compare_sizes
 
 BASE = dict(zip(SWEPT, (50.0, 0.0, 0.2, 0.3, 5.0), strict=True))

@@ -1,0 +1,52 @@
+"""A whole study, and the workflow's configuration that names it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from filtercake.study.config.crystals import Crystallizer, Csd
+from filtercake.study.config.filter import Filter
+from filtercake.study.config.material import Material
+from filtercake.study.config.packing import Packing
+from filtercake.study.config.published import Published
+from filtercake.study.config.sweep import Sweep
+from filtercake.study.config.values import ENTRIES, LISTED, MOST_VALUES, TO_TEXT, Model, Name, PathText
+
+MOST_DISTRIBUTIONS = 200
+"""Distributions of a study, the crystallizer's products among them."""
+
+
+class Study(Model):
+    """A parameter study: distributions, material, packing settings and the points to visit."""
+
+    title: Annotated[str, Field(max_length=120), TO_TEXT] = Field(
+        default="", description="One line for figures and reports."
+    )
+    csds: Annotated[dict[Name, Csd], Field(max_length=MOST_DISTRIBUTIONS)] = Field(
+        default={}, description="The distributions by name."
+    )
+    crystallizer: Crystallizer | None = Field(default=None, description="Where the crystals come from.")
+    filter: Filter | None = Field(default=None, description="Where the slurry goes; needs a crystallizer.")
+    material: Material = Field(description="The crystals.")
+    packing: Packing = Field(default=Packing(), description="How the packings are made.")
+    sweeps: Annotated[list[Sweep], Field(min_length=1, max_length=MOST_VALUES)] = Field(
+        description="Blocks of points; their union is visited."
+    )
+    published: Annotated[list[Published], Field(max_length=MOST_VALUES)] = Field(
+        default=[], description="Published values to show beside ours."
+    )
+
+
+class Workflow(Model):
+    """The workflow's configuration: which studies to run, and where their results go."""
+
+    studies: Annotated[list[PathText], LISTED, ENTRIES] = Field(
+        default=["pmma"], description="Names of files in config/studies, or paths of study files."
+    )
+    calibrations: Annotated[list[PathText], LISTED, Field(max_length=MOST_VALUES)] = Field(
+        default=[], description="Names of files in config/calibrations, or paths of calibration files."
+    )
+    results: PathText = Field(default="results", description="Folder of the results.")
+    quick: bool = Field(default=False, description="For the benchmarks: a few packings of each case.")
