@@ -23,7 +23,7 @@ RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(CONFIG),calibrate --confi
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: run report browser benchmark stability faults reference calibrate test test-all slurm-test lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability pages faults reference calibrate test test-all slurm-test lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -85,6 +85,12 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.md docs/)
 	$(if $(QUICK),,install -m 644 results/benchmark/images/stability_maps.png docs/images/)
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.csv docs/data/)
+
+pages: setup ## redraw docs/benchmark.md and docs/stability.md from the tables in docs/data
+	$(SNAKEMAKE) redraw
+	install -m 644 results/benchmark_redrawn/*.md docs/
+	install -m 644 results/benchmark_redrawn/images/*.png docs/images/
+	install -m 644 results/benchmark_redrawn/*.csv docs/data/
 
 faults: setup ## hurt small sweeps in 200 ways (COUNT for another number) and resume them: docs/reliability.md (about 20 min; goes on where it was stopped)
 	@command -v faketime >/dev/null || apt-get install -y -qq --no-install-recommends faketime >/dev/null 2>&1 || \

@@ -40,7 +40,7 @@ RENAMED = {
 """Keys of earlier versions, and what they are called now."""
 """Problems of a file that are looked into."""
 
-OWN_NAMES = ("benchmark", "benchmark_quick", "benchmarks", "logs", "pages")
+OWN_NAMES = ("benchmark", "benchmark_quick", "benchmark_redrawn", "benchmarks", "logs", "pages")
 """Folders of the results that are the workflow's own: no study can have such a name."""
 
 OWN_PREFIXES = ("agreement_", "calibration_")

@@ -9,11 +9,13 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from filtercake.validation.error_against_time import DEFAULT, reference_of
+from filtercake.study import limits
+from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
 from filtercake.validation.stability import COVERAGE, OUTCOMES, WRONG, families, undetected
 
 INTERIOR, COUNT = "interior slab", "count"
 PAPER = "as published"
+OK = OUTCOMES[0]
 
 
 def reference_table(replicates: pd.DataFrame, cases: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
@@ -74,6 +76,7 @@ def benchmark(
             "mean": float(coverage["n"].mean()),
         },
         headline={case: headline(errors[errors["case"] == case]) for case in errors["case"].unique()},
+        said={case: said(errors[errors["case"] == case]) for case in errors["case"].unique()},
         data=tables,
     )
 
@@ -103,6 +106,27 @@ def headline(errors: pd.DataFrame) -> dict[str, Any]:
     return found
 
 
+def said(errors: pd.DataFrame) -> dict[str, Any]:
+    """Sum up what one case's variants say, by the interior porosity.
+
+    Returns
+    -------
+    dict
+        ``variants`` (how many), ``front`` (how many are on it), ``biased`` (rows whose bias is larger than its 95 %
+        interval), ``failed`` (rows with failed packings) and ``analytic`` (rows of the models without packings).
+    """
+    interior = errors[errors["estimator"] == INTERIOR]
+    analytic = interior["axis"] == ANALYTIC
+    packed = interior[~analytic]
+    return {
+        "variants": len(packed),
+        "front": int(packed["on_front"].sum()),
+        "biased": _records(packed[packed["bias"].abs() > COVERAGE * packed["bias_se"]]),
+        "failed": _records(packed[packed["n_failed"] > 0]),
+        "analytic": _records(interior[analytic]),
+    }
+
+
 def stability(template: Path, table: pd.DataFrame) -> str:
     """Write the page on the stress tests.
 
@@ -116,18 +140,53 @@ def stability(template: Path, table: pd.DataFrame) -> str:
     wrong = (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
     return _render(
         template,
-        rows=_records(table),
+        outcomes=OUTCOMES,
         counts=[
-            {"fence": fence, **{outcome: int((group["outcome"] == outcome).sum()) for outcome in OUTCOMES}}
-            for fence, group in table.groupby("fence")
+            {"engine": engine, "fence": fence, "of": [int((group["outcome"] == outcome).sum()) for outcome in OUTCOMES]}
+            for (engine, fence), group in table.groupby(["engine", "fence"])
         ],
+        maps=[
+            {"family": family, "engine": engine, "ok": int((rows["outcome"] == OK).sum()), "n": len(rows)}
+            | {"x_name": rows["x_name"].iloc[0], "y_name": rows["y_name"].iloc[0], "failing": failing(rows)}
+            for (family, engine), rows in table.groupby(["family", "engine"], sort=False)
+        ],
+        limits=vars(limits),
         total=len(table),
         absent=[name for name in families() if name not in set(table["family"])],
         wrong=_records(table[wrong]),
         undetected=_records(undetected(table)),
         drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),
-        gain=float(table.loc[(table["outcome"] == "ok") & (table["fence"] == "allowed"), "energy_gain"].max()),
+        gain=float(table.loc[(table["outcome"] == OK) & (table["fence"] == "allowed"), "energy_gain"].max()),
     )
+
+
+def failing(rows: pd.DataFrame) -> list[str]:
+    """Say where along x the cases of one map are not ok: a text for every set of y with the same answer.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        The cases of one family and engine: x, y, outcome.
+    """
+    found: dict[str, list[str]] = {}
+    for y, line in rows.sort_values("x").groupby("y"):
+        bad = line[line["outcome"] != OK]
+        if not bad.empty:
+            where = f"{_range(bad['x'].tolist(), line['x'].tolist())} ({', '.join(bad['outcome'].unique())})"
+            found.setdefault(where, []).append(f"{y:g}")
+    return [f"{', '.join(ys)}: {where}" for where, ys in found.items()]
+
+
+def _range(some: list[float], every: list[float]) -> str:
+    """Say which of sorted values some are."""
+    count = len(some)
+    if count == len(every):
+        return "everywhere"
+    if some == every[-count:]:
+        return f"from {some[0]:g}"
+    if some == every[:count]:
+        return f"up to {some[-1]:g}"
+    return "at " + ", ".join(f"{value:g}" for value in some)
 
 
 def reliability(template: Path, table: pd.DataFrame) -> str:

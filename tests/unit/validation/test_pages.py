@@ -12,7 +12,7 @@ from filtercake.figures.style import applied
 from filtercake.validation import pages
 from filtercake.validation.error_against_time import COLUMNS
 from filtercake.validation.figures import run_time_error, stability_maps
-from filtercake.validation.stability import cases, with_fence
+from filtercake.validation.stability import OUTCOMES, cases, with_fence
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 TEMPLATES = REPOSITORY / "workflow" / "report"
@@ -72,8 +72,22 @@ def test_without_the_published_protocol_there_is_no_ratio() -> None:
     assert set(pages.headline(rows[rows["axis"] != "as published"])) == {"default"}
 
 
+def test_a_case_is_summed_up_by_the_interior_porosity() -> None:
+    errors = error_rows().assign(on_front=[True, False, False, True, False, False, True, False])
+    spheres, counted = errors.index[3], errors.index[1]
+    errors.loc[[spheres, counted], "bias"] = [-0.0011, 0.01]  # of 0.0005 standard error
+    errors.loc[errors.index[4], ["bias", "n", "n_failed"]] = [0.0009, 5, 3]
+    found = pages.said(errors)
+    assert (found["variants"], found["front"]) == (4, 3)
+    assert [row["axis"] for row in found["biased"]] == ["spheres"]
+    assert [row["engine"] for row in found["failed"]] == ["liggghts"]
+    assert [row["engine"] for row in found["analytic"]] == ["Farr-Groot"]
+
+
 def test_the_benchmark_page_holds_the_tables_numbers() -> None:
     errors = error_rows().assign(on_front=True)
+    errors.loc[errors.index[3], "bias"] = -0.0048
+    errors.loc[errors.index[4], ["n", "n_failed"]] = [5, 3]
     data = REPOSITORY / "docs" / "data"
     page = pages.benchmark(TEMPLATES / "benchmark.md.j2", errors, references(), choice_rows(), coverage_rows(), data)
     assert "| pmma | filtercake's default | 0.5 | 200 |" in page
@@ -81,6 +95,10 @@ def test_the_benchmark_page_holds_the_tables_numbers() -> None:
     assert "| drop height | the paper's | 2 times | -0.0040 +- 0.0010 | +4.0 % |" in page
     assert "| pmma | 0.3512 | 0.0004 | 24 |" in page
     assert "in 2 of 3" in page
+    assert "Biased: spheres 0.5 (-0.0048)." in page
+    assert "Failed: engine (liggghts) (3 of 8)." in page
+    assert "| pmma | count | 0.3500 |" in page
+    assert "Analytic models are off by 0.0430 (Farr-Groot)." in page
     assert "{{" not in page
     assert "nan" not in page.lower().replace("nano", "")
 
@@ -116,12 +134,49 @@ def test_the_stability_page_tells_the_wrong_ones() -> None:
     part = pages.stability(TEMPLATES / "stability.md.j2", table[table["family"] != "size_ratio_skin"])
     assert "though `make stability` makes them: size_ratio_skin." in part
     assert "None: every accepted packing" in page
-    assert "the bed exploded / far away" in page
+    assert "data/stability.csv" in page and len(page.splitlines()) < 100
     place = table.index[table["fence"] == "allowed"][0]
     table.loc[place, ["bias", "outcome"]] = [0.02, "inaccurate"]
     page = pages.stability(TEMPLATES / "stability.md.j2", table)
     assert "+0.0200 +- 0.0020" in page
     assert "Of these, 1 pass the configuration without a word" in page
+
+
+def test_the_stability_page_counts_verdicts_of_each_engine() -> None:
+    table = with_fence(stress_rows())
+    page = pages.stability(TEMPLATES / "stability.md.j2", table)
+    for engine in ("embedded", "liggghts"):
+        for fence in ("allowed", "warned", "refused"):
+            here = table[(table["engine"] == engine) & (table["fence"] == fence)]["outcome"]
+            counts = [int((here == outcome).sum()) for outcome in OUTCOMES]
+            assert f"| {engine} | {fence} | {' | '.join(map(str, counts))} |" in page
+
+
+def test_a_map_says_where_it_fails() -> None:
+    outcomes = {
+        0.0: ["ok", "ok", "ok"],
+        1.0: ["ok", "unsettled", "exploded"],
+        2.0: ["ok", "unsettled", "exploded"],
+        3.0: ["exploded", "ok", "ok"],
+        4.0: ["refused", "refused", "refused"],
+        5.0: ["exploded", "ok", "exploded"],
+    }
+    rows = [(x, y, found) for y, line in outcomes.items() for x, found in zip((0.1, 0.5, 2.0), line, strict=True)]
+    table = pd.DataFrame(rows, columns=["x", "y", "outcome"]).sample(frac=1.0, random_state=1)
+    assert pages.failing(table) == [
+        "1, 2: from 0.5 (unsettled, exploded)",
+        "3: up to 0.1 (exploded)",
+        "4: everywhere (refused)",
+        "5: at 0.1, 2 (exploded)",
+    ]
+
+
+def test_the_committed_stability_page_is_that_of_its_table() -> None:
+    docs = TEMPLATES.parents[1] / "docs"
+    table = pd.read_csv(docs / "data" / "stability.csv")
+    assert (with_fence(table)["fence"] == table["fence"]).all(), "make pages"
+    page = pages.stability(TEMPLATES / "stability.md.j2", table)
+    assert page == (docs / "stability.md").read_text(encoding="utf-8"), "make pages"
 
 
 def test_the_fence_of_a_case_is_todays() -> None:
