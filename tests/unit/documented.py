@@ -80,7 +80,12 @@ class Command:
 @cache
 def pages() -> list[str]:
     """Pages of the documentation, relative to the repository."""
-    found = ["README.md", "config/README.md", *(f"docs/{path.name}" for path in (REPOSITORY / "docs").glob("*.md"))]
+    found = [
+        "README.md",
+        "CONTRIBUTING.md",
+        "config/README.md",
+        *(f"docs/{path.name}" for path in (REPOSITORY / "docs").glob("*.md")),
+    ]
     return sorted(found)
 
 

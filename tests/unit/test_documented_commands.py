@@ -1,9 +1,9 @@
 """Every command of the documentation is run, every block of YAML is loaded and every block of Python executed.
 
-All commands in README.md, config/README.md and docs/*.md are found by themselves, in blocks and in code spans
-(:mod:`documented`). Those of the ``filtercake`` command line run as they are printed; a ``make`` target must exist and
-what it asks Snakemake for must be planned without an error, and so must what the pages ask Snakemake for. A command
-that is none of these stands in :data:`RUN_BY`, beside the test that runs it.
+All commands in README.md, CONTRIBUTING.md, config/README.md and docs/*.md are found by themselves, in blocks and in
+code spans (:mod:`documented`). Those of the ``filtercake`` command line run as they are printed; a ``make`` target must
+exist and what it asks Snakemake for must be planned without an error, and so must what the pages ask Snakemake for. A
+command that is none of these stands in :data:`RUN_BY`, beside the test that runs it.
 """
 
 from __future__ import annotations
