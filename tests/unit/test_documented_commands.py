@@ -61,6 +61,7 @@ RUN_BY = {
     (TUTORIAL, "."): TUTORIAL_TEST,
     (TUTORIAL, "timeout"): TUTORIAL_TEST,
     (TUTORIAL, "filtercake"): TUTORIAL_TEST,
+    ("README.md", "filtercake"): "tests/unit/test_readme_example.py::test_an_answer_is_what_its_command_prints",
     (CLUSTER, "."): CLUSTER_TEST,
     (CLUSTER, "squeue"): CLUSTER_TEST,
 }
