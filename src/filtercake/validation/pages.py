@@ -16,6 +16,8 @@ from filtercake.validation.stability import COVERAGE, OUTCOMES, WRONG, families,
 INTERIOR, COUNT = "interior slab", "count"
 PAPER = "as published"
 OK = OUTCOMES[0]
+FAILING = ("inaccurate", "unsettled", "exploded", "refused")
+"""Outcomes of a case beyond a limit."""
 
 
 def reference_table(replicates: pd.DataFrame, cases: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
@@ -161,7 +163,7 @@ def stability(template: Path, table: pd.DataFrame) -> str:
 
 
 def failing(rows: pd.DataFrame) -> list[str]:
-    """Say where along x the cases of one map are not ok: a text for every set of y with the same answer.
+    """Say where along x the cases of one map fail: a text for every set of y with the same answer.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ def failing(rows: pd.DataFrame) -> list[str]:
     """
     found: dict[str, list[str]] = {}
     for y, line in rows.sort_values("x").groupby("y"):
-        bad = line[line["outcome"] != OK]
+        bad = line[line["outcome"].isin(FAILING)]
         if not bad.empty:
             where = f"{_range(bad['x'].tolist(), line['x'].tolist())} ({', '.join(bad['outcome'].unique())})"
             found.setdefault(where, []).append(f"{y:g}")
