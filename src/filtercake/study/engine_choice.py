@@ -12,7 +12,7 @@ from filtercake.study.loading import LoadedStudy
 
 
 def choose(scene: Scene) -> str:
-    """Name the engine for ``engine: auto``: the first that suits the scene and runs here; the embedded one always does."""
+    """Name the engine for ``engine: auto``: the first that suits the scene and runs here."""
     return next(name for name, kind in ENGINES.items() if kind.suits(scene) and kind().why_missing() is None)
 
 

@@ -65,6 +65,7 @@ def default_time_step(friction: float) -> float:
 
 def refusals(scene: Scene) -> Iterator[Finding]:
     """Say what is proven unstable about a scene."""
+    rayleigh = scene.rayleigh_time_step
     if scene.relative_overlap > LARGEST_RELATIVE_OVERLAP:
         limit = contact_law.cohesion_at_overlap(LARGEST_RELATIVE_OVERLAP, scene.youngs_modulus, scene.poisson_ratio)
         yield Finding(
@@ -75,16 +76,16 @@ def refusals(scene: Scene) -> Iterator[Finding]:
         )
     if scene.density > LARGEST_DENSITY:
         yield Finding("density", f"must be at most {LARGEST_DENSITY:g} kg/m3 ({PAGE})")
-    if scene.time_step >= LARGEST_TIME_STEP * scene.rayleigh_time_step:
+    if scene.time_step >= LARGEST_TIME_STEP * rayleigh:
         yield Finding(
             "time_step",
-            f"must be below the Rayleigh time step {scene.rayleigh_time_step / MICROSECOND:.4g} us ({PAGE}); leave it out for "
+            f"must be below the Rayleigh time step {rayleigh / MICROSECOND:.4g} us ({PAGE}); leave it out for "
             f"{FRICTIONLESS_TIME_STEP:g} of that (without friction) or {FRICTIONAL_TIME_STEP:g} (with)",
         )
-    elif scene.time_step < SMALLEST_TIME_STEP * (1.0 - 1e-9) * scene.rayleigh_time_step:
+    elif scene.time_step < SMALLEST_TIME_STEP * (1.0 - 1e-9) * rayleigh:
         yield Finding(
             "time_step",
-            f"must be at least {SMALLEST_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh_time_step / MICROSECOND:.4g} us: "
+            f"must be at least {SMALLEST_TIME_STEP:g} of the Rayleigh time step {rayleigh / MICROSECOND:.4g} us: "
             "shorter ones change nothing but the run time",
         )
     else:
@@ -97,6 +98,7 @@ def refusals(scene: Scene) -> Iterator[Finding]:
 
 def _long_steps(scene: Scene) -> Iterator[Finding]:
     """Say which time steps under the Rayleigh step are still too long for a scene."""
+    rayleigh, overlap = scene.rayleigh_time_step, scene.relative_overlap
     limits = (
         (
             scene.restitution < SMALL_RESTITUTION,
@@ -104,28 +106,28 @@ def _long_steps(scene: Scene) -> Iterator[Finding]:
             f"at a restitution under {SMALL_RESTITUTION:g}: above it, porosities look right but are off by 0.01",
         ),
         (
-            scene.relative_overlap > DOUBTFUL_RELATIVE_OVERLAP,
+            overlap > DOUBTFUL_RELATIVE_OVERLAP,
             SOFT_TIME_STEP,
-            f"where contacts overlap by {scene.relative_overlap:.1%} of the diameter: above it, beds do not come to rest",
+            f"where contacts overlap by {overlap:.1%} of the diameter: above it, beds do not come to rest",
         ),
         (scene.friction > 0.0, FRICTIONAL_LIMIT, "with friction: above it, beds do not come to rest"),
     )
     for holds, limit, why in limits:
-        if holds and scene.time_step > (limit + 1e-9) * scene.rayleigh_time_step:
+        if holds and scene.time_step > (limit + 1e-9) * rayleigh:
             yield Finding(
                 "time_step",
-                f"must be at most {limit:g} of the Rayleigh time step {scene.rayleigh_time_step / MICROSECOND:.4g} us {why} "
-                f"({PAGE})",
+                f"must be at most {limit:g} of the Rayleigh time step {rayleigh / MICROSECOND:.4g} us {why} ({PAGE})",
             )
 
 
 def doubts(scene: Scene) -> Iterator[Finding]:
     """Say what is allowed about a scene, but makes its porosity depend on a choice of numbers."""
-    if DOUBTFUL_RELATIVE_OVERLAP < scene.relative_overlap <= LARGEST_RELATIVE_OVERLAP:
+    overlap = scene.relative_overlap
+    if DOUBTFUL_RELATIVE_OVERLAP < overlap <= LARGEST_RELATIVE_OVERLAP:
         yield Finding(
             "cohesion",
-            f"contacts overlap by {scene.relative_overlap:.1%} of the diameter, which alone lowers the porosity by about "
-            f"{3 * 0.65 * scene.relative_overlap:.3f} ({PAGE})",
+            f"contacts overlap by {overlap:.1%} of the diameter, which alone lowers the porosity by about "
+            f"{3 * 0.65 * overlap:.3f} ({PAGE})",
         )
     if scene.restitution > LARGE_RESTITUTION:
         yield Finding(

@@ -361,9 +361,8 @@ def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str
     """Every scene of a study, with the keys and values that a finding of the fence may be about."""
     for index, sweep in enumerate(model.sweeps):
         axes = [_values(model, index, name) for name in SWEPT]
-        for name, places in itertools.product(
-            [name for name in sweep.csd or [] if name in csds], itertools.product(*axes)
-        ):
+        known = [name for name in sweep.csd or [] if name in csds]
+        for name, places in itertools.product(known, itertools.product(*axes)):
             where = dict(zip(SWEPT, places, strict=True))
             scene = scene_of(model, csds[name].truncated, {axis: value for axis, (_, value) in where.items()})
             keys = {

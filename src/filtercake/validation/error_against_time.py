@@ -186,7 +186,7 @@ class _Maker:
         return [Variant("as published", float(steps), made, replicates)]
 
 
-def _of_modulus(scene: Scene, youngs_modulus: float) -> dict[str, float]:
+def _of_modulus(scene: Scene, youngs_modulus: float) -> dict[str, Any]:
     """Contacts of another stiffness (Pa) and the same sticking speed: s ~ E^0.8, at the same Rayleigh fraction."""
     cohesion = scene.cohesion * (youngs_modulus / scene.youngs_modulus) ** 0.8
     made = replace(scene, youngs_modulus=youngs_modulus, cohesion=cohesion).with_time_step(scene.rayleigh_fraction)

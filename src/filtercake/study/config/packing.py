@@ -17,7 +17,7 @@ AUTO = "auto"
 
 def _engine(name: str) -> str:
     if name not in (AUTO, *ENGINES):
-        raise ValueError(f"allowed: {', '.join((AUTO, *ENGINES))}")
+        raise ValueError(f"allowed: {', '.join(map(repr, (AUTO, *ENGINES)))}")
     return name
 
 
