@@ -76,8 +76,8 @@ def test_both_engines_make_the_same_points() -> None:
     for path in sorted((REPOSITORY / "config" / "benchmarks").glob("agreement_*.yaml")):
         study = load_study(path)
         one, other = (expand(with_engine(study, engine), lambda *_: "") for engine in ("liggghts", "embedded"))
-        assert [point.spec.engine for point in one] == ["liggghts"] * len(one)
+        assert [point.scene.engine for point in one] == ["liggghts"] * len(one)
         for a, b in zip(one, other, strict=True):
             assert a.name != b.name
-            assert {**a.spec.as_dict(), "engine": ""} == {**b.spec.as_dict(), "engine": ""}
+            assert {**a.scene.as_dict(), "engine": ""} == {**b.scene.as_dict(), "engine": ""}
             assert a.study == f"{path.stem}_liggghts"

@@ -114,6 +114,14 @@ def test_a_label_in_the_study_makes_no_packing(finished):
     assert set(planned) - {"all"} == {"tables", "figure", "provenance"}
 
 
+def test_more_time_pictures_or_processes_make_no_packing_anew(finished):
+    study = finished.root / "config/test/tiny.yaml"
+    more = "packing:\n  time_limit_min: 300\n  write_vtk: true\n  processes: 2\n"
+    with edited(study, lambda text: text.replace("packing:\n", more)):
+        planned = finished.planned()
+    assert not planned["packing"] and not planned["replicates"] and not planned["points"]
+
+
 def test_an_edited_size_distribution_remakes_only_its_points(finished):
     table = finished.root / "config/test/tiny.csv"
     with edited(table, lambda text: text.replace("50,0.25", "50,0.20").replace("40,0.25", "40,0.30")):

@@ -81,7 +81,7 @@ def library(module):
 
 def packing_library(wildcards):
     """Those behind a point's packings: of the engines, only the one it uses."""
-    return [str(path) for path in packing_sources(point_of(wildcards).spec.engine)]
+    return [str(path) for path in packing_sources(point_of(wildcards).scene.engine)]
 
 
 def study_of(wildcards):
@@ -150,21 +150,14 @@ def csd_file(wildcards):
     return [str(file)] if file else []
 
 
-def packed_csd(wildcards):
-    """The distribution that a point packs."""
-    return study_of(wildcards).csds[point_of(wildcards).csd].truncated
-
-
 def packing_minutes(wildcards, attempt):
     """Walltime from measured run times; doubled on every retry."""
-    return estimate.walltime_minutes(
-        point_of(wildcards), packed_csd(wildcards), attempt
-    )
+    return estimate.walltime_minutes(point_of(wildcards), attempt)
 
 
 def packing_group(wildcards):
     """Name of the submissions that short points share on a cluster; the profile says how many."""
-    size = estimate.group_size(point_of(wildcards), packed_csd(wildcards))
+    size = estimate.group_size(point_of(wildcards))
     return f"packing_{size}" if size > 1 else None
 
 
@@ -190,12 +183,8 @@ def points_to_make():
 def cost_of(points_by_study):
     """What the packings of points will cost."""
     return estimate.together(
-        estimate.estimate(
-            points,
-            {name: csd.truncated for name, csd in KNOWN[study].csds.items()},
-            on_cluster=not workflow.local_exec,
-        )
-        for study, points in points_by_study.items()
+        estimate.estimate(points, on_cluster=not workflow.local_exec)
+        for points in points_by_study.values()
     )
 
 

@@ -1,5 +1,6 @@
 """Rule packing: make all replicates of a point."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -7,12 +8,12 @@ import pandas as pd
 from filtercake.crystals.csd import from_table
 from filtercake.packing.pack import pack_replicates
 from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.run.job import Progress, job
 from filtercake.run.provenance import code_hash
 
 
-def main(table, sources, spec, asked, manifest, point, logger):
+def main(table, sources, asked, manifest, point, logger):
     """Pack and report each replicate as it comes."""
     progress = Progress()
 
@@ -30,9 +31,10 @@ def main(table, sources, spec, asked, manifest, point, logger):
 
     _, truncated = from_table(pd.read_csv(table))
     code = code_hash([Path(source) for source in sources])
-    spec = PackingSpec.from_dict(spec)
-    enough = UntilNarrow(spec, asked.interval, asked.replicates) if asked.interval else lambda _: False
-    pack_replicates(spec, truncated, asked.most, Path(manifest).parent, code, report, note, enough)
+    # sizes as the table has them: what is packed is what the resistance is computed for
+    scene = replace(Scene.from_dict({**asked.scene, **asked.incidental}), csd=truncated)
+    enough = UntilNarrow(scene, asked.interval, asked.replicates) if asked.interval else lambda _: False
+    pack_replicates(scene, asked.most, Path(manifest).parent, code, report, note, enough)
     if asked.interval:
         note(f"interval {enough.half_width:.2g} after {len(enough.values)} packings, {asked.interval:g} asked for")
 
@@ -41,7 +43,6 @@ with job(snakemake.log[0], snakemake.output) as log:
     main(
         snakemake.input.csd,
         [*snakemake.input.library, *snakemake.input.templates],
-        snakemake.params.spec,
         snakemake.params,
         snakemake.output[0],
         snakemake.wildcards.point,

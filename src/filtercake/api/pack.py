@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
+from filtercake.crystals.csd import FullAndTruncated
 from filtercake.errors import ConfigError, Problem
 from filtercake.packing.engines.liggghts import template_folder
 from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates
@@ -91,8 +91,8 @@ def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None,
     point = base_point(study, name, engine_choice.choose)
     csd = study.csds[name]
     # a resistance beyond floating point is found before the packings are made, not after
-    resistance(source, porosity=0.01, density_kg_m3=point.spec.density, sphericity=study.model.material.sphericity)
-    outcomes = _make(point, csd.truncated, path, say)
+    resistance(source, porosity=0.01, density_kg_m3=point.scene.density, sphericity=study.model.material.sphericity)
+    outcomes = _make(point, path, say)
     sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
     rows = [_row(point, outcome, path, sizes, sphericity) for outcome in outcomes]
     table = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
@@ -112,18 +112,18 @@ def code_of(engine: str) -> str:
     return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
 
 
-def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Say) -> list[Outcome]:
+def _make(point: Point, folder: Path, say: Say) -> list[Outcome]:
     def report(outcome: Outcome, record: dict[str, Any]) -> None:
         if outcome.status == "ok":
             say(f"r{outcome.replicate}: {record['steps']:,} steps, {record['wall_s']:.1f} s")
         else:
             say(f"r{outcome.replicate} failed: {outcome.reason}")
 
-    interval, code = point.porosity_ci95_target, code_of(point.spec.engine)
+    interval, code = point.porosity_ci95_target, code_of(point.scene.engine)
     enough: Callable[[Path], bool] = lambda _: False  # noqa: E731 - the other branch is an object
     if interval is not None:
-        enough = UntilNarrow(point.spec, interval, point.replicates)
-    return pack_replicates(point.spec, csd, point.most_replicates, folder, code, report, say, enough)
+        enough = UntilNarrow(point.scene, interval, point.replicates)
+    return pack_replicates(point.scene, point.most_replicates, folder, code, report, say, enough)
 
 
 def _row(point: Point, outcome: Outcome, folder: Path, sizes: FullAndTruncated, sphericity: float) -> dict[str, Any]:
@@ -139,8 +139,12 @@ def _summary(table: pd.DataFrame, point: Point) -> dict[str, Any]:
     for name, value in plain.items():
         if isinstance(value, float) and not math.isfinite(value):
             plain[name] = None
-    bed = {"particles": point.spec.particles, "bed_depth_factor": point.spec.bed_depth_factor, "seed": point.spec.seed}
-    return {**plain, **bed, "density_kg_m3": point.spec.density, "time_step_us": point.spec.time_step / MICROSECOND}
+    bed = {
+        "particles": point.scene.particles,
+        "bed_depth_factor": point.scene.bed_depth_factor,
+        "seed": point.scene.seed,
+    }
+    return {**plain, **bed, "density_kg_m3": point.scene.density, "time_step_us": point.scene.time_step / MICROSECOND}
 
 
 def _check_folder(folder: Path) -> None:

@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 
 from filtercake.crystals.crystallizer import SteadyState
 from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.errors import ConfigError, FilterError, PackingRejected, Problem
+from filtercake.errors import ConfigError, CsdError, FilterError, PackingRejected, Problem
 from filtercake.filtration.drum_filter import (
     DrumFilter,
     area,
@@ -31,7 +31,7 @@ from filtercake.filtration.resistance import carman_sauter, kozeny_carman, log_s
 from filtercake.packing.cloud import NARROW_PARTICLES
 from filtercake.packing.porosity import measure, porosity_profile
 from filtercake.packing.result import Packing
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.slab import bed_height
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.values import TO_NUMBER, Density, Model
@@ -298,9 +298,9 @@ def porosity(npz: str | Path) -> PackingPorosity:
     PackingRejected
         If a file is missing, damaged, not what was accepted, or the bed has no interior.
     """
-    packing, spec = load_packing(Path(npz))
+    packing, scene = load_packing(Path(npz))
     try:
-        found = measure(packing, spec)
+        found = measure(packing, scene)
     except ValueError as error:
         raise PackingRejected([f"{npz}: {error}; use more particles"]) from None
     return PackingPorosity(
@@ -312,7 +312,7 @@ def porosity(npz: str | Path) -> PackingPorosity:
         interior_to_um=found.slab.upper / MICROMETRE,
         bed_height_um=bed_height(packing.position, packing.radius) / MICROMETRE,
         particles=int(packing.radius.size),
-        engine=spec.engine,
+        engine=scene.engine,
     )
 
 
@@ -344,7 +344,7 @@ def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> 
     return pd.DataFrame({"height_um": 0.5 * (edges[1:] + edges[:-1]) / MICROMETRE, "porosity": values})
 
 
-def load_packing(npz: Path) -> tuple[Packing, PackingSpec]:
+def load_packing(npz: Path) -> tuple[Packing, Scene]:
     """Read a packing and what it is made of, and make sure that it is one.
 
     Raises
@@ -359,14 +359,16 @@ def load_packing(npz: Path) -> tuple[Packing, PackingSpec]:
     except PackingRejected as error:
         raise PackingRejected([f"{npz.parent}: {error}"]) from None
     try:
-        spec = PackingSpec.from_dict(packing.diagnostics["spec"])
-    except (KeyError, TypeError):
-        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed"]) from None
+        scene = Scene.from_dict(packing.diagnostics["scene"])
+    except KeyError:
+        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed (no scene)"]) from None
+    except (CsdError, OverflowError, TypeError, ValueError) as error:
+        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed: {error}"]) from None
     n = packing.radius.size
     sound = n > 0 and packing.radius.shape == (n,) and packing.position.shape == (n, 3) and packing.length > 0.0
     if not (sound and np.isfinite(packing.position).all() and (packing.radius > 0.0).all()):
         raise PackingRejected([f"{npz} does not hold a packing"])
-    return packing, spec
+    return packing, scene
 
 
 def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mapping[str, Any]) -> LoadedStudy:

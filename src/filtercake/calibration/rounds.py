@@ -294,7 +294,7 @@ def _named(
         for c in candidates
         if c.batch == batch
         and np.isclose(cohesions, _cohesion(c)).any()
-        and np.isclose(frictions, c.point.spec.friction).any()
+        and np.isclose(frictions, c.point.scene.friction).any()
     )
 
 

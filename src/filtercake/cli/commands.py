@@ -362,8 +362,7 @@ def _run_estimate(options: argparse.Namespace) -> int:
         raise words.UsageError(f"--cores = {asked}: must be a whole number, from 1")
     study = load_study(Path(options.study))
     points = expand(study, engine_choice.choose)
-    csds = {name: csd.truncated for name, csd in study.csds.items()}
-    found = estimate(points, csds, on_cluster=options.cluster)
+    found = estimate(points, on_cluster=options.cluster)
     wall = found.wall_seconds(int(asked))
     if options.json:
         return _print_json({**asdict(found), "wall_seconds": wall})

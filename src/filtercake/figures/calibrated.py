@@ -18,6 +18,7 @@ from scipy import special
 
 from filtercake.calibration.fit import CONFIDENCE
 from filtercake.calibration.measurements import Measurements, compressibility_by_csd
+from filtercake.packing.engines import label_of
 from filtercake.packing.replication import half_width
 
 if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
@@ -233,7 +234,7 @@ def footer(figure: Figure, data: CalibrationData, packings: Sequence[str], engin
 
     estimator = ESTIMATORS.get(data.summary["estimator"], data.summary["estimator"])
     what = "cohesion and friction fitted" if data.fits_friction else f"cohesion fitted at friction {data.friction:g}"
-    names = ", ".join(style.ENGINES.get(name, name) for name in sorted({str(engine) for engine in engines}))
+    names = ", ".join(label_of(name) for name in sorted({str(engine) for engine in engines}))
     style.footer(figure, pd.DataFrame(), f"{what}, resistances from the {estimator}", *packings, names, *notes)
 
 

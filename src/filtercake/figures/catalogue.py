@@ -113,7 +113,7 @@ class FigureSpec:
 def _varies(name: str) -> Callable[[list[Point]], bool]:
     def applies(points: list[Point]) -> bool:
         return any(
-            len({getattr(point.spec, name) for point in points if point.csd == csd}) > 1
+            len({getattr(point.scene, name) for point in points if point.csd == csd}) > 1
             for csd in {point.csd for point in points}
         )
 

@@ -19,6 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
+from filtercake.packing.engines import label_of
 from filtercake.study.config.published import Published
 from filtercake.units import FloatArray
 
@@ -41,13 +42,6 @@ PUBLISHED_WORDS = {"simulation": "simulated", "measurement": "measured"}
 
 POROSITY = "Porosity (–)"
 COHESION = "Cohesion energy density (kJ/m³)"
-
-ENGINES = {
-    "liggghts": "LIGGGHTS",
-    "liggghts_as_published": "LIGGGHTS (protocol as published)",
-    "embedded": "embedded engine",
-}
-"""Names of engines for readers; one that is not listed keeps its own."""
 
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
@@ -357,7 +351,7 @@ def describe_counts(rows: pd.DataFrame) -> str:
     least, most, failed = int(rows["n"].min()), int(rows["n"].max()), int(rows["n_failed"].sum())
     each = f"n = {least}" if least == most else f"n = {least} to {most}"
     per_point = " per point" if len(rows) > 1 else ""
-    engines = ", ".join(ENGINES.get(name, name) for name in sorted(set(rows["engine"].astype(str))))
+    engines = ", ".join(label_of(name) for name in sorted(set(rows["engine"].astype(str))))
     return f"{each} packing{'' if most == 1 else 's'}{per_point}, {failed or 'none'} failed; {engines}"
 
 

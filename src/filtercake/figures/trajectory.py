@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.packing.engines import kind_of
 from filtercake.units import FloatArray
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def draw(data: StudyData) -> Figure:
         style.nothing(upper, "no accepted packing at the base material")
         style.footer(figure, rows, note)
         return figure
-    stopped = "end of the fixed run" if point["engine"] == "liggghts_as_published" else "stopped: bed at rest"
+    stopped = "end of the fixed run" if kind_of(point["engine"]).fixed_steps else "stopped: bed at rest"
     inset = upper.inset_axes((0.52, 0.46, 0.37, 0.52))
     for axes in (upper, inset):
         _lines(axes, runs, "porosity_sample", stopped)

@@ -8,7 +8,7 @@ import numpy as np
 
 from filtercake.packing import contact_law
 from filtercake.packing.result import Packing
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.slab import Slab, bed_height, interior_slab
 from filtercake.units import FloatArray
 
@@ -117,7 +117,7 @@ def porosity_profile(position: FloatArray, radius: FloatArray, length: float, ed
     return np.asarray(1.0 - np.diff(below) / (length**2 * np.diff(edges)))
 
 
-def measure(packing: Packing, spec: PackingSpec) -> PorosityResult:
+def measure(packing: Packing, scene: Scene) -> PorosityResult:
     """Measure all porosities of an accepted packing."""
     position, radius, length = packing.position, packing.radius, packing.length
     slab = interior_slab(position, radius)
@@ -125,9 +125,9 @@ def measure(packing: Packing, spec: PackingSpec) -> PorosityResult:
     return PorosityResult(
         interior=interior,
         from_floor=slab_porosity(position, radius, length, Slab(0.0, min(length, bed_height(position, radius)))),
-        paper_count=paper_count_porosity(position, radius, length, spec.bed_depth_factor),
+        paper_count=paper_count_porosity(position, radius, length, scene.bed_depth_factor),
         compaction=contact_law.soft_contact_compaction(
-            interior, spec.cohesion, spec.youngs_modulus, spec.poisson_ratio
+            interior, scene.cohesion, scene.youngs_modulus, scene.poisson_ratio
         ),
         slab=slab,
     )

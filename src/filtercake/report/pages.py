@@ -11,7 +11,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from filtercake.figures import style
+from filtercake.packing.engines import label_of
 from filtercake.packing.result import publish
 from filtercake.report import words
 from filtercake.report.catalogue import PAGES
@@ -44,7 +44,7 @@ class Content:
 
 def engine_names(engines: Iterable[str]) -> str:
     """Names of engines for readers, each once."""
-    return ", ".join(style.ENGINES.get(name, name) for name in sorted(set(engines)))
+    return ", ".join(label_of(name) for name in sorted(set(engines)))
 
 
 def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Mapping[str, Any]) -> dict[str, Content]:

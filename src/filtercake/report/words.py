@@ -7,7 +7,8 @@ import re
 
 import pandas as pd
 
-from filtercake.figures.style import ENGINES, power_of_ten, scientific
+from filtercake.figures.style import power_of_ten, scientific
+from filtercake.packing.engines import label_of
 
 UNITS = {
     "kJ_m3": "kJ/m³",
@@ -125,7 +126,7 @@ def readable(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         [
             with_interval(float(row[name]), float(row[halves[name]]))
             if name in halves
-            else cell(ENGINES.get(row[name], row[name]) if name == "engine" else row[name])
+            else cell(label_of(row[name]) if name == "engine" else row[name])
             for name in shown
         ]
         for row in table.to_dict("records")

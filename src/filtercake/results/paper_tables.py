@@ -15,7 +15,8 @@ from filtercake.filtration.resistance import kozeny_carman
 from filtercake.packing.cloud import box_length
 from filtercake.study.config.published import Published
 from filtercake.study.config.study import Study
-from filtercake.study.points import base_rows, bed_of
+from filtercake.study.points import base_rows
+from filtercake.study.scenes import bed_of
 from filtercake.units import HOUR, LITRE, MICROMETRE, MINUTE, tidy
 
 Csds = dict[str, FullAndTruncated]

@@ -79,8 +79,8 @@ def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, spheric
     sphericity : float
         For the resistance law.
     """
-    found, record = measure(packing, point.spec), packing.diagnostics
-    (full, truncated), law = csd, (point.spec.density, sphericity)
+    found, record = measure(packing, point.scene), packing.diagnostics
+    (full, truncated), law = csd, (point.scene.density, sphericity)
     return {
         **point.row(),
         "replicate": record["replicate"],

@@ -30,7 +30,7 @@ def worth_reading(record: logging.LogRecord) -> bool:
 
 def plan(points: Points, packings: int) -> str:
     """One line about what a run is about to do."""
-    engines = sorted({point.spec.engine for group in points.values() for point in group.values()})
+    engines = sorted({point.scene.engine for group in points.values() for point in group.values()})
     total = sum(len(group) for group in points.values())
     return f"filtercake: {', '.join(points)}: {total} points, {packings} packings to make with {', '.join(engines)}"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.metadata
+import inspect
 import platform
 import subprocess
 from functools import cache
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from filtercake import __version__
+from filtercake.packing.engines import ENGINES
 from filtercake.packing.result import sha256
 from filtercake.packing.scene import digest
 
@@ -49,12 +51,12 @@ def packing_sources(engine: str) -> tuple[Path, ...]:
     FileNotFoundError
         If there is no such engine.
     """
-    registry, start = _file_of("packing.engines"), _file_of(f"packing.engines.{engine}")
-    if registry is None or start is None:
+    if engine not in ENGINES:
         raise FileNotFoundError(f"filtercake has no engine {engine!r}")
-    own = _closure(start, closed=registry)
+    registry = ROOT / "packing" / "engines" / "__init__.py"
+    own = _closure(Path(inspect.getfile(ENGINES[engine])), closed=registry)
     others = set(registry.parent.glob("*.py")) - own
-    return tuple(path for path in sources("packing.pack") if path not in others)
+    return tuple(sorted(own | set(sources("packing.pack")) - others))
 
 
 def _closure(start: Path, closed: Path | None = None) -> set[Path]:

@@ -15,8 +15,8 @@ from pydantic import BaseModel, ValidationError
 from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
 from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, shown
-from filtercake.packing import contact_law
 from filtercake.packing.cloud import bed_for
+from filtercake.packing.scene import Scene
 from filtercake.study import limits
 from filtercake.study.config.crystals import Crystallizer, Csd
 from filtercake.study.config.packing import Packing
@@ -24,7 +24,8 @@ from filtercake.study.config.study import MOST_DISTRIBUTIONS, Study, Workflow
 from filtercake.study.config.sweep import SWEPT
 from filtercake.study.config.values import MOST_PARTICLES, MOST_POINTS, NAME
 from filtercake.study.products import resolve, slurry_problems
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
+from filtercake.study.scenes import scene_of
+from filtercake.units import MICROMETRE, MINUTE
 from filtercake.user_files import is_file, read_yaml
 
 MOST_PROBLEMS = 1000
@@ -356,41 +357,21 @@ def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
             yield Problem(file, key, repr(name), allowed)
 
 
-def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str, tuple[str, float]], limits.Numbers]]:
-    """Every scene of a study as the fence sees it, with the keys and values that a finding may be about."""
-    packing, material = model.packing, model.material
+def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str, tuple[str, float]], Scene]]:
+    """Every scene of a study, with the keys and values that a finding of the fence may be about."""
     for index, sweep in enumerate(model.sweeps):
         axes = [_values(model, index, name) for name in SWEPT]
-        for name in sweep.csd or []:
-            if name not in csds:
-                continue
-            smallest = csds[name].truncated.smallest
-            for places in itertools.product(*axes):
-                where = dict(zip(SWEPT, places, strict=True))
-                value = {axis: number for axis, (_, number) in where.items()}
-                modulus, poisson = value["youngs_modulus_MPa"] * MEGAPASCAL, value["poisson_ratio"]
-                rayleigh = contact_law.rayleigh_time_step(0.5 * smallest, material.density, modulus, poisson)
-                step = packing.time_step(rayleigh, value["friction"])
-                keys = {
-                    "cohesion": where["cohesion_kJ_m3"],
-                    "time_step": _time_step_key(packing, step / rayleigh),
-                    "restitution": where["restitution"],
-                    "density": ("material.density_kg_m3", material.density),
-                }
-                yield (
-                    keys,
-                    limits.Numbers(
-                        smallest=smallest,
-                        density=material.density,
-                        youngs_modulus=modulus,
-                        poisson_ratio=poisson,
-                        restitution=value["restitution"],
-                        friction=value["friction"],
-                        cohesion=value["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
-                        time_step=step,
-                        engine=packing.engine,
-                    ),
-                )
+        known = [name for name in sweep.csd or [] if name in csds]
+        for name, places in itertools.product(known, itertools.product(*axes)):
+            where = dict(zip(SWEPT, places, strict=True))
+            scene = scene_of(model, csds[name].truncated, {axis: value for axis, (_, value) in where.items()})
+            keys = {
+                "cohesion": where["cohesion_kJ_m3"],
+                "time_step": _time_step_key(model.packing, scene.rayleigh_fraction),
+                "restitution": where["restitution"],
+                "density": ("material.density_kg_m3", model.material.density),
+            }
+            yield keys, scene
 
 
 def _time_step_key(packing: Packing, fraction: float) -> tuple[str, float]:

@@ -99,7 +99,7 @@ def headline(errors: pd.DataFrame) -> dict[str, Any]:
     if published.empty:
         return found
     paper = _only(published)
-    ours = interior[(interior["engine"] == "embedded") & (interior["n_failed"] == 0)]
+    ours = interior[(interior["engine"] == found["default"]["engine"]) & (interior["n_failed"] == 0)]
     as_good = ours[ours["error"] <= paper["error"]].sort_values("seconds")
     found |= {"published": paper, "times_faster": paper["seconds"] / found["default"]["seconds"]}
     if not as_good.empty:

@@ -16,7 +16,7 @@ from filtercake.errors import EngineError
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import embedded_kernels as kernels
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
 SKIN_DIAMETERS = (0.08, 1.5)
@@ -81,16 +81,16 @@ class Bed:
         velocity: FloatArray,
         radius: FloatArray,
         length: float,
-        spec: PackingSpec,
+        scene: Scene,
         gravity: float = GRAVITY,
         threads: int = 1,
     ):
         """Start from positions (n, 3) m, velocities (n, 3) m/s and radii (n,) m; every sphere is in the bed."""
         n = radius.size
         self.gravity, self.threads = gravity, threads
-        self.spec, self.length, self.total = spec, length, n
-        self.frictional = spec.friction > 0.0
-        self.spheres = np.column_stack([position, radius, velocity, spec.density * 4.0 / 3.0 * np.pi * radius**3])
+        self.scene, self.length, self.total = scene, length, n
+        self.frictional = scene.friction > 0.0
+        self.spheres = np.column_stack([position, radius, velocity, scene.density * 4.0 / 3.0 * np.pi * radius**3])
         self.position, self.velocity = self.spheres[:, :3], self.spheres[:, 4:7]
         self.radius, self.mass = self.spheres[:, 3], self.spheres[:, 7]
         self.spin = np.zeros((n, 3))
@@ -117,16 +117,16 @@ class Bed:
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
         self.listed_at = 0  # step of the last listing
-        self.kernel = kernels.make_advance(spec.cohesion > 0.0, self.frictional, threads > 1)
+        self.kernel = kernels.make_advance(scene.cohesion > 0.0, self.frictional, threads > 1)
         self.find_pairs = kernels.make_find_pairs(threads > 1)
 
     @classmethod
-    def from_cloud(cls, cloud: Cloud, spec: PackingSpec, threads: int = 1) -> Bed:
+    def from_cloud(cls, cloud: Cloud, scene: Scene, threads: int = 1) -> Bed:
         """Start from a cloud of spheres falling together: all airborne."""
         order = np.argsort(cloud.position[:, 2] - cloud.radius, kind="stable")
         velocity = np.zeros_like(cloud.position)
-        velocity[:, 2] = -spec.settling_velocity
-        bed = cls(cloud.position[order], velocity, cloud.radius[order], cloud.length, spec, threads=threads)
+        velocity[:, 2] = -scene.settling_velocity
+        bed = cls(cloud.position[order], velocity, cloud.radius[order], cloud.length, scene, threads=threads)
         bed.identity = order
         bed.touched[:] = False
         bed.count = 0
@@ -134,14 +134,16 @@ class Bed:
         return bed
 
     def _set_material(self) -> None:
-        spec = self.spec
-        self.modulus = contact_law.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
-        shear = contact_law.shear_modulus(spec.youngs_modulus, spec.poisson_ratio) / (2.0 * (2.0 - spec.poisson_ratio))
-        self.damping_ratio = contact_law.damping_ratio(spec.restitution)
+        scene = self.scene
+        self.modulus = contact_law.effective_modulus(scene.youngs_modulus, scene.poisson_ratio)
+        shear = contact_law.shear_modulus(scene.youngs_modulus, scene.poisson_ratio) / (
+            2.0 * (2.0 - scene.poisson_ratio)
+        )
+        self.damping_ratio = contact_law.damping_ratio(scene.restitution)
         self.law = kernels.Law(
             float(self.gravity),
-            float(spec.cohesion),
-            float(spec.friction),
+            float(scene.cohesion),
+            float(scene.friction),
             6.0 * shear / self.modulus,  # 8 G* over 4/3 E*
             math.sqrt(4.0 * shear / self.modulus),  # root of 8 G* over 2 E*
         )
@@ -160,7 +162,7 @@ class Bed:
         return {**arrays, **pairs, "totals": totals, "numbers": numbers}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Go on from what :meth:`saved` returned for a bed of the same cloud, spec and number of threads.
+        """Go on from what :meth:`saved` returned for a bed of the same cloud, scene and number of threads.
 
         Raises
         ------
@@ -187,12 +189,12 @@ class Bed:
 
     def fallen(self, step: int) -> float:
         """Distance an airborne sphere has fallen after ``step`` steps, m."""
-        t = step * self.spec.time_step
-        return self.spec.settling_velocity * t + 0.5 * self.gravity * t * t
+        t = step * self.scene.time_step
+        return self.scene.settling_velocity * t + 0.5 * self.gravity * t * t
 
     def falling_speed(self, step: float) -> float:
         """Speed of an airborne sphere after ``step`` steps, m/s."""
-        return self.spec.settling_velocity + self.gravity * step * self.spec.time_step
+        return self.scene.settling_velocity + self.gravity * step * self.scene.time_step
 
     def advance(self, steps: int) -> None:
         """Advance by ``steps`` time steps; afterwards the forces at the positions are known."""
@@ -224,7 +226,7 @@ class Bed:
             self.grounded,
             self.law,
             self.length,
-            self.spec.time_step,
+            self.scene.time_step,
             self.skin,
             self.frame_step * (self.step - self.listed_at),
             self.frame_step,
@@ -237,7 +239,7 @@ class Bed:
         """Wake the airborne spheres that the bed may reach, and list the pairs."""
         falling = not self.touched.all()
         # half way between what falls and what lies: neither moves more than half as much in this frame
-        self.frame_step = -0.5 * self.falling_speed(self.step) * self.spec.time_step if falling else 0.0
+        self.frame_step = -0.5 * self.falling_speed(self.step) * self.scene.time_step if falling else 0.0
         self.skin = self._choose_skin()
         self._mark_touched()
         while self._wake():  # what was woken may be about to meet the floor itself
@@ -257,9 +259,9 @@ class Bed:
 
     def _choose_skin(self) -> float:
         """Skin, m, that lasts ``LISTING_STEPS`` at the present speeds, within bounds set by the smallest size."""
-        if self.spec.skin > 0.0:
-            return self.spec.skin
-        n, step = self.count, self.spec.time_step
+        if self.scene.skin > 0.0:
+            return self.scene.skin
+        n, step = self.count, self.scene.time_step
         relative = self.velocity[:n].copy()
         relative[:, 2] -= self.frame_step / step
         speed = math.sqrt(float(np.einsum("ij,ij->i", relative, relative).max(initial=0.0)))
@@ -376,7 +378,7 @@ class Bed:
         """Positions and full-step velocities in the engine's own order."""
         n = self.count
         position, velocity = self.position.copy(), self.velocity.copy()
-        half = 0.0 if self.starting else 0.5 * self.spec.time_step
+        half = 0.0 if self.starting else 0.5 * self.scene.time_step
         velocity[:n] += half * self.force[0, :n] / self.mass[:n, None]
         position[n:, 2] -= self.fallen(self.step)
         velocity[n:, 2] = -self.falling_speed(self.step)
@@ -394,7 +396,7 @@ class Bed:
         spin = self.spin.copy()
         if self.frictional and not self.starting:
             inertia = 0.4 * self.mass * self.radius**2
-            spin[: self.count] += (0.5 * self.spec.time_step * self.torque[0] / inertia[:, None])[: self.count]
+            spin[: self.count] += (0.5 * self.scene.time_step * self.torque[0] / inertia[:, None])[: self.count]
         return spin[np.argsort(self.identity)]
 
     def record(self) -> tuple[float, float, float, float]:
@@ -403,5 +405,5 @@ class Bed:
         height = float(np.average(position[:, 2], weights=self.mass))
         energy = float(0.5 * np.sum(self.mass * np.sum(velocity**2, axis=1)))
         sampled = (position[:, 2] >= 0.0) & (position[:, 2] <= self.length)
-        porosity = 1.0 - float(self.mass[sampled].sum()) / self.spec.density / self.length**3
-        return self.step * self.spec.time_step, height, energy, porosity
+        porosity = 1.0 - float(self.mass[sampled].sum()) / self.scene.density / self.length**3
+        return self.step * self.scene.time_step, height, energy, porosity

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from filtercake.figures import style
 from filtercake.filtration.resistance import log_sensitivity
+from filtercake.packing.engines import label_of
 from filtercake.units import FloatArray
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT
 
@@ -70,21 +71,16 @@ def _panel(axes: Axes, rows: pd.DataFrame, noise: float) -> None:
     axes.set_xlabel("Run time of one packing (s)")
     axes.set_ylabel("Error in porosity (–)")
     axes.axhspan(LEAST_ERROR, max(noise, LEAST_ERROR), color=style.FAINT, alpha=0.2, linewidth=0)
+    default = interior[interior["axis"] == DEFAULT]
+    own = "".join(default["engine"].head(1))
     for index, axis in enumerate(AXES):
         here = interior[interior["axis"] == axis]
-        for engine, marker in (("embedded", "o"), ("liggghts", "s")):
-            of = here[here["engine"] == engine]
-            label = {"embedded": axis, "liggghts": f"{axis}, LIGGGHTS"}[engine]
-            if len(of):
-                axes.plot(
-                    of["seconds"],
-                    _shown(of["error"]),
-                    marker,
-                    color=style.colour(index),
-                    markersize=4,
-                    label=label if axis != "engine" else "LIGGGHTS, default",
-                )
-    _default(axes, interior[interior["axis"] == DEFAULT], noise)
+        for engine, of in here.groupby("engine"):
+            other = label_of(str(engine))
+            label = axis if engine == own else f"{other}, default" if axis == "engine" else f"{axis}, {other}"
+            marker = "o" if engine == own else "s"
+            axes.plot(of["seconds"], _shown(of["error"]), marker, color=style.colour(index), markersize=4, label=label)
+    _default(axes, default, noise)
     for estimator, fill in ((COUNT, style.INK), (INTERIOR, "white")):
         label = f"{AS_PUBLISHED}, {estimator}"
         published = rows[(rows["axis"] == AS_PUBLISHED) & (rows["estimator"] == estimator)]

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from filtercake.figures import style
-from filtercake.validation.stability import OUTCOMES
+from filtercake.packing.engines import label_of
+from filtercake.validation.stability import OUTCOMES, SI_UNITS
 
 COLOURS = {
     "ok": "#009E73",
@@ -30,7 +31,6 @@ NAMES = {
     "density_kg_m3": "Density (kg/m³)",
     "drop_height": "Drop height / the paper's",
 }
-ENGINES = {"embedded": "embedded", "liggghts": "LIGGGHTS", "liggghts_si": "LIGGGHTS, SI units"}
 
 
 def draw(table: pd.DataFrame) -> Figure:
@@ -99,4 +99,6 @@ def _map(axes: Axes, rows: pd.DataFrame, engine: str) -> None:
     axes.tick_params(labelsize=5.5)
     axes.set_xlabel(NAMES[rows["x_name"].iloc[0]], fontsize=7)
     axes.set_ylabel(NAMES[rows["y_name"].iloc[0]], fontsize=7)
-    axes.set_title(ENGINES.get(engine, engine), loc="left", fontsize=7)
+    axes.set_title(
+        f"{label_of(engine.removesuffix('_si'))}{', SI units' if engine == SI_UNITS else ''}", loc="left", fontsize=7
+    )
