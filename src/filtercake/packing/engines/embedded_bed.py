@@ -116,7 +116,7 @@ class Bed:
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
         self.listed_at = 0  # step of the last listing
-        self.kernel = kernels.make_advance(threads > 1)
+        self.kernel = kernels.make_advance(spec.cohesion > 0.0, self.frictional, threads > 1)
         self.find_pairs = kernels.make_find_pairs(threads > 1)
 
     @classmethod

@@ -205,6 +205,10 @@ CLOSE_TO_LIMIT = 0.95
 FUSED = {"contract"}
 """Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
 
+_compiled = njit(cache=True, error_model="numpy", fastmath=FUSED)
+_inlined = njit(cache=True, error_model="numpy", fastmath=FUSED, forceinline=True)
+"""For what is told the kind of scene: inlined where the kind is a constant, it loses what this kind doesn't need."""
+
 # indices are unsigned: signed ones cost a test for negative values at every access
 IMAGE_SHIFT = np.uint32(28)
 INDEX_MASK = np.uint32(2**28 - 1)
@@ -218,7 +222,7 @@ STIFFNESS, DAMPING = range(2)
 @njit(cache=True, error_model="numpy")
 def _layer(z: float, side: float, layers: int) -> int:
     """Layer of cells that a height lies in."""
-    return min(max(math.floor(z / side), 0), layers - 1)
+    return min(max(int(z / side), 0), layers - 1)
 
 
 @njit(cache=True)
@@ -278,7 +282,7 @@ def sort_into_cells(
     return _by_cell(cell, start), start, shape, offset
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _find_pairs(part: int, state: FloatArray, grid: Grid, skin: float, pairs: Pairs) -> int:
     """List the pairs of one part's spheres in its share of the list; return how many they are."""
     bounds, first, last, neighbour = pairs.bounds, pairs.first, pairs.last, pairs.neighbour
@@ -384,7 +388,7 @@ def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
                         spring[p, k] = -old_spring[q, k]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _limit_speeds(state: FloatArray, patches: Patches) -> None:
     """Give every patch of spheres a vertical speed of its own, and the speed relative to it that none may exceed."""
     patch_speed, patch_limit = patches.speed, patches.limit
@@ -407,7 +411,7 @@ def _limit_speeds(state: FloatArray, patches: Patches) -> None:
         patch_limit[b] = OWN_ROOM * patch_limit[b] + COMMON_ROOM * fastest
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _apart(
     x: float, y: float, z: float, state: FloatArray, neighbour: int, length: float
 ) -> tuple[Any, float, float, float]:
@@ -421,7 +425,7 @@ def _apart(
     return j, dx, dy, dz
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law: Law) -> None:
     """Copy those of one part's pairs that may touch within ``NEAR_STEPS`` to the near ones."""
     first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
@@ -452,7 +456,7 @@ def _pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law
         near_constants[k, DAMPING] = constants[near_pair[k], DAMPING]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
     """Return the largest distance from the reference in a frame that has risen by ``frame``, m."""
     farthest = 0.0
@@ -462,7 +466,7 @@ def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
     return math.sqrt(farthest)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _limit_spring(
     hx: float, hy: float, hz: float, stiffness: float, allowed: float
 ) -> tuple[float, float, float, bool]:
@@ -482,13 +486,13 @@ def _share(part: int, bodies: Bodies) -> range:
 
 
 @njit(cache=True)
-def _clear(part: int, bodies: Bodies, law: Law) -> None:
+def _clear(part: int, bodies: Bodies, gravity: float, frictional: bool) -> None:
     """Set one layer of the forces and torques to nothing but, in the first, the spheres' weight."""
     force, torque = bodies.force[part], bodies.torque[part]
     for i in range(bodies.state.shape[0]):
         force[i, 0] = force[i, 1] = 0.0
-        force[i, 2] = -law.gravity * bodies.state[i, MASS] if part == 0 else 0.0
-        if law.friction > 0.0:
+        force[i, 2] = -gravity * bodies.state[i, MASS] if part == 0 else 0.0
+        if frictional:
             torque[i, 0] = torque[i, 1] = torque[i, 2] = 0.0
 
 
@@ -506,10 +510,11 @@ def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
                     torque[other, i, k] = 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _pair_forces(part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float) -> None:
+@_inlined
+def _pair_forces(
+    part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, cohesive: bool, frictional: bool
+) -> None:
     """Add the forces and torques of the pairs of one part's spheres to its layers."""
-    cohesive, frictional = law.cohesion > 0.0, law.friction > 0.0
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[part], bodies.torque[part]
     last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
     spring, pair, length = pairs.spring, pairs.near_pair, law.length
@@ -590,10 +595,9 @@ def _pair_forces(part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step:
             torque[i, 2] += tz
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float) -> None:
+@_inlined
+def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, cohesive: bool, frictional: bool) -> None:
     """Add the floor's forces and torques to the total."""
-    cohesive, frictional = law.cohesion > 0.0, law.friction > 0.0
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     constants, spring, grounded = floor.constants, floor.spring, floor.grounded
     for k in range(grounded.size):
@@ -630,14 +634,15 @@ def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float) ->
             torque[i, 1] -= arm * px
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _move(part: int, bodies: Bodies, patches: Patches, kick: float, frame_speed: float, law: Law) -> tuple[float, bool]:
+@_inlined
+def _move(
+    part: int, bodies: Bodies, patches: Patches, kick: float, frame_speed: float, law: Law, frictional: bool
+) -> tuple[float, bool]:
     """Kick and move one part's spheres, and leave their weight in the total force for the next step to add to.
 
     ``kick`` is the time, s, that the force has acted. Returns the largest squared speed in the frame, and whether
     a sphere was faster than its patch may be.
     """
-    frictional = law.friction > 0.0
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     gravity, time_step = law.gravity, law.time_step
     fastest, too_fast = 0.0, False
@@ -674,10 +679,10 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 
 
 @cache
-def make_advance(threaded: bool) -> Callable[..., tuple[int, bool]]:
-    """Compile the time loop, for one thread or several.
+def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
+    """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
-    A threaded loop gives each thread a share of the pairs and a force buffer of its own.
+    The kind is all that is bound here: numba finds a function that binds compiled ones in no cache. A threaded loop gives each thread a share of the pairs and a force buffer of its own.
     """
 
     @njit(cache=True, error_model="numpy", fastmath=FUSED, parallel=threaded)
@@ -706,7 +711,7 @@ def make_advance(threaded: bool) -> Callable[..., tuple[int, bool]]:
         done, picked = 0, 0  # picked: steps that the choice of near pairs will last yet
         if not ready:
             for t in prange(parts):
-                _clear(t, bodies, law)
+                _clear(t, bodies, law.gravity, frictional)
         while True:
             if not ready:
                 if picked == 0:
@@ -716,11 +721,11 @@ def make_advance(threaded: bool) -> Callable[..., tuple[int, bool]]:
                         _pick_near(t, state, pairs, patches, law)
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
-                    _pair_forces(t, bodies, pairs, law, spring_step)
+                    _pair_forces(t, bodies, pairs, law, spring_step, cohesive, frictional)
                 if parts > 1:
                     for t in prange(parts):
-                        _add_layers(t, bodies, law.friction > 0.0)
-                _floor_forces(floor, bodies, law, spring_step)
+                        _add_layers(t, bodies, frictional)
+                _floor_forces(floor, bodies, law, spring_step, cohesive, frictional)
                 ready = True
             if done == steps:
                 return done, ready
@@ -728,7 +733,7 @@ def make_advance(threaded: bool) -> Callable[..., tuple[int, bool]]:
             starting = False
             frame += listing.frame_step
             for t in prange(parts):
-                speed[t], too_fast[t] = _move(t, bodies, patches, kick, frame_speed, law)
+                speed[t], too_fast[t] = _move(t, bodies, patches, kick, frame_speed, law, frictional)
             picked = 0 if too_fast.any() else max(picked - 1, 0)
             drift += math.sqrt(speed.max()) * time_step  # none has moved farther
             if not drift < limit:
