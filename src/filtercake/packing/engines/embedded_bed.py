@@ -46,21 +46,21 @@ STATE_ARRAYS = (
     "spin",
     "floor_spring",
     "reference",
-    "bounds",
     *SIZED_ARRAYS,
 )
 STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step")
 
 
-def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
+def _no_pairs(threads: int, capacity: int, frictional: bool) -> kernels.Pairs:
     """Make an empty pair list with room for ``capacity`` pairs."""
     return kernels.Pairs(
-        first=np.zeros(spheres, dtype=np.uint64),
-        last=np.zeros(spheres, dtype=np.uint64),
+        bounds=np.zeros(threads + 1, dtype=np.int64),
+        first=np.empty(0, dtype=np.uint64),
+        last=np.empty(0, dtype=np.uint64),
         neighbour=np.empty(capacity, dtype=np.uint32),
         constants=np.empty((capacity, 2)),
         spring=np.zeros((capacity if frictional else 1, 3)),
-        near_last=np.zeros(spheres, dtype=np.uint64),
+        near_last=np.empty(0, dtype=np.uint64),
         near_neighbour=np.empty(capacity, dtype=np.uint32),
         near_constants=np.empty((capacity, 2)),
         near_pair=np.empty(capacity, dtype=np.uint32),
@@ -107,11 +107,10 @@ class Bed:
         self._set_material()
         self.force = np.zeros((threads, n, 3))
         self.torque = np.zeros((threads, n if self.frictional else 1, 3))
-        self.bounds = np.zeros(threads + 1, dtype=np.int64)
         self.reference = np.zeros((n, 3))
         self.watched = np.empty(0, dtype=np.int64)
         self.grounded = np.empty(0, dtype=np.int64)
-        self.pairs = _no_pairs(0, 8 * n + 64 * threads, self.frictional)
+        self.pairs = _no_pairs(threads, 8 * n + 64 * threads, self.frictional)
         self.skin, self.frame_step = 0.0, 0.0
         self.count = n
         self.step = 0
@@ -146,6 +145,8 @@ class Bed:
             float(scene.friction),
             6.0 * shear / self.modulus,  # 8 G* over 4/3 E*
             math.sqrt(4.0 * shear / self.modulus),  # root of 8 G* over 2 E*
+            float(self.length),
+            float(scene.time_step),
         )
         damping = 2.0 * math.sqrt(5.0 / 6.0) * self.damping_ratio
         root = np.sqrt(self.radius)
@@ -209,28 +210,11 @@ class Bed:
 
     def _run(self, steps: int) -> int:
         n = self.count
-        done, self.ready = self.kernel(
-            steps,
-            self.ready,
-            self.starting,
-            self.spheres[:n],
-            self.spin[:n],
-            self.force,
-            self.torque,
-            self.floor[:n],
-            self.floor_spring[:n],
-            self.pairs,
-            self.bounds,
-            self.reference[:n],
-            self.watched,
-            self.grounded,
-            self.law,
-            self.length,
-            self.scene.time_step,
-            self.skin,
-            self.frame_step * (self.step - self.listed_at),
-            self.frame_step,
-        )
+        moment = kernels.Moment(self.ready, self.starting, self.frame_step * (self.step - self.listed_at))
+        bodies = kernels.Bodies(self.spheres[:n], self.spin[:n], self.force, self.torque)
+        floor = kernels.Floor(self.floor[:n], self.floor_spring[:n], self.grounded)
+        listing = kernels.Listing(self.reference[:n], self.watched, self.skin, self.frame_step)
+        done, self.ready = self.kernel(steps, moment, bodies, floor, self.pairs, listing, self.law)
         self.starting = self.starting and done == 0
         self.listed = self.ready
         return int(done)
@@ -327,14 +311,18 @@ class Bed:
             )
         cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
         top = max(top, 0.0)
-        order = kernels.sort_in_space(self.spheres[:n], float(self.largest[0]), self.length, top)
+        # spheres of any size that are close in space, close in memory: by small cubes
+        cubes = self.largest[:1]
+        order = kernels.sort_into_cells(self.spheres[:n], np.zeros(n, dtype=np.int64), cubes, self.length, top)[0]
         for array in self._arrays():
             array[:n] = array[:n][order]
         spheres, level = self.spheres[:n], self.level[:n]
         index, start, shape, offset = kernels.sort_into_cells(spheres, level, cell_size, self.length, top)
         place = np.empty_like(index)
         place[index] = np.arange(n)
-        grid = kernels.Grid(spheres[index, :4], index, place, start, shape, offset, self.largest, cell_size)
+        grid = kernels.Grid(
+            self.length, level, spheres[index, :4], index, place, start, shape, offset, self.largest, cell_size
+        )
         pairs = self._find_pairs(grid)
         kernels.pair_constants(self.spheres[:n], pairs, self.modulus, self.damping_ratio)
         if self.frictional:
@@ -347,17 +335,15 @@ class Bed:
     def _find_pairs(self, grid: kernels.Grid) -> kernels.Pairs:
         n, capacity = self.count, self.pairs.neighbour.size
         # without springs to carry over, the old list's room serves again
-        pairs = _no_pairs(0, capacity, True) if self.frictional else self.pairs
+        pairs = _no_pairs(self.threads, capacity, True) if self.frictional else self.pairs
+        bounds = np.linspace(0, n, self.threads + 1).astype(np.int64)
         first, last = np.empty(n, dtype=np.uint64), np.empty(n, dtype=np.uint64)
-        self.bounds[:] = np.linspace(0, n, self.threads + 1).astype(np.int64)
-        spheres, level = self.spheres[:n], self.level[:n]
         while True:
-            count = self.find_pairs(
-                self.bounds, spheres, level, grid, self.length, self.skin, first, last, pairs.neighbour
-            )
+            pairs = pairs._replace(bounds=bounds, first=first, last=last)
+            count = self.find_pairs(self.spheres[:n], grid, self.skin, pairs)
             if count < pairs.neighbour.size // self.threads:
-                return pairs._replace(first=first, last=last, near_last=last.copy())
-            pairs = _no_pairs(0, int(1.3 * count) * self.threads, self.frictional)
+                return pairs._replace(near_last=last.copy())
+            pairs = _no_pairs(self.threads, int(1.3 * count) * self.threads, self.frictional)
 
     def _carry_springs(self, order: IntArray, pairs: kernels.Pairs) -> None:
         origin = np.where(order < self.pairs.first.size, order, -1)
@@ -367,8 +353,7 @@ class Bed:
         """Give every thread as many pairs as the others."""
         done = np.cumsum(self.pairs.last - self.pairs.first)
         shares = np.arange(1, self.threads) * (done[-1] / self.threads)
-        self.bounds[1:-1] = np.searchsorted(done, shares)
-        self.bounds[0], self.bounds[-1] = 0, self.count
+        self.pairs.bounds[1:-1] = np.searchsorted(done, shares)
 
     def _arrays(self) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.generic]], ...]:
         arrays = [self.spheres, self.floor, self.force[0], self.identity, self.level, self.touched]
