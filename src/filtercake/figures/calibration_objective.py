@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,10 +13,8 @@ from scipy import special
 
 from filtercake.calibration.fit import CONFIDENCE
 from filtercake.figures import calibrated, style
+from filtercake.figures.calibrated import CalibrationData
 from filtercake.units import FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
 
 THRESHOLD = float(special.chdtri(1, 1.0 - CONFIDENCE))
 """Deviance up to which a value belongs to the 95 % interval of one parameter."""

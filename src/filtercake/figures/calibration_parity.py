@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,10 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from filtercake.figures import calibrated, style
+from filtercake.figures.calibrated import CalibrationData
 from filtercake.units import FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
 
 MARGIN = 1.08
 """Factor by which the axes go beyond the data."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,10 +10,8 @@ from matplotlib.ticker import LogLocator
 
 from filtercake.calibration.rounds import SAFETY_FACTOR
 from filtercake.figures import calibrated, style
+from filtercake.figures.calibrated import CalibrationData
 from filtercake.figures.calibration_parity import resistance_abscissa
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
 
 RESISTANCE = ("resistance_m_kg", "resistance_low_m_kg", "resistance_high_m_kg", "resistance_with_safety_factor_m_kg")
 AREA = ("filter_area_m2", "filter_area_low_m2", "filter_area_high_m2", "filter_area_with_safety_factor_m2")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,9 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from filtercake.figures import calibrated, style
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
+from filtercake.figures.calibrated import CalibrationData
 
 TOGETHER = 3
 """Most distributions in one panel."""

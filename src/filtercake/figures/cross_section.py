@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -14,12 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import bed_height, interior_slab
 from filtercake.units import MICROMETRE, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 FEW_SIZES = 5
 """Up to so many sizes are named in a legend; more take a colour bar."""

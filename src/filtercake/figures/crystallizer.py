@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.units import LITRE, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 
 def draw(data: StudyData) -> Figure:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
 from filtercake.figures.filtered import filtered
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
+from filtercake.figures.selection import StudyData
 
 VOLUME = "crystallizer_volume_m3"
 ASIDE = 2

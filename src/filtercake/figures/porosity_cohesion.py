@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
+from filtercake.figures.selection import StudyData
 
 FREE = ("cohesion_kJ_m3", "friction")
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -11,9 +9,7 @@ from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
 from filtercake.figures.porosity_cohesion import FREE
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
+from filtercake.figures.selection import StudyData
 
 
 def draw(data: StudyData) -> Figure:

@@ -1,24 +1,84 @@
-"""What of a study a figure shows: its base points, their accepted packings, and the published values beside them."""
+"""A study as its figures see it: tables, base points, accepted packings, and the published values beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from filtercake.crystals.crystallizer import SteadyState
+from filtercake.crystals.csd import FullAndTruncated, from_table
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
 from filtercake.study.config.published import Published
+from filtercake.study.config.study import Study
 from filtercake.study.points import base_rows
 from filtercake.units import LITRE, MICROMETRE, MINUTE
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-    from filtercake.figures.catalogue import StudyData
+@dataclass(frozen=True)
+class StudyData:
+    """Everything a figure may show of a study.
+
+    Attributes
+    ----------
+    name : str
+        The study.
+    study : Study
+        Its model (labels, published values, material).
+    points, summary, replicates : DataFrame
+        Its tables (see :mod:`filtercake.study.points`).
+    csds : dict of str to FullAndTruncated
+        Full and truncated distribution by name.
+    packings : Path
+        Folder with one folder of packings per point.
+    crystallizer : DataFrame
+        The table of the crystallizer's states (:func:`filtercake.results.paper_tables.crystallizer_table`); empty
+        without one.
+    """
+
+    name: str
+    study: Study
+    points: pd.DataFrame
+    summary: pd.DataFrame
+    replicates: pd.DataFrame
+    csds: dict[str, FullAndTruncated]
+    packings: Path
+    crystallizer: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    @classmethod
+    def read(
+        cls, name: str, study: Mapping[str, Any], folder: Path, csds: Iterable[str], crystallizer: Iterable[str]
+    ) -> StudyData:
+        """Read a study's tables.
+
+        Parameters
+        ----------
+        name : str
+            The study.
+        study : mapping
+            Its model's values.
+        folder : Path
+            Its results: points.csv, summary.csv, replicates.csv, packings.
+        csds : iterable of str
+            Tables of its distributions, named by them.
+        crystallizer : iterable of str
+            The crystallizer's table, if it has one.
+        """
+        return cls(
+            name=name,
+            study=Study.model_validate(study),
+            points=pd.read_csv(folder / "points.csv"),
+            summary=pd.read_csv(folder / "summary.csv"),
+            replicates=pd.read_csv(folder / "replicates.csv"),
+            csds={Path(table).stem: from_table(pd.read_csv(table)) for table in csds},
+            packings=folder / "packings",
+            crystallizer=next(map(pd.read_csv, crystallizer), pd.DataFrame()),
+        )
 
 
 def label(data: StudyData, csd: str) -> str:

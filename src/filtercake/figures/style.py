@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
+from filtercake.packing.result import publish
 from filtercake.study.config.published import Published
 from filtercake.units import FloatArray
+
+FOOTER = "Description"
+"""Metadata of a PNG that holds the line below its figure: packings, failures, engine."""
 
 SINGLE, MEDIUM, DOUBLE = 3.5, 5.0, 7.0
 """Widths of a figure, in: one column, one and a half, two."""
@@ -81,6 +86,19 @@ def applied() -> Iterator[None]:
     """Draw and save in the house style; saving too, because matplotlib makes some ticks only then."""
     with mpl_style.context(_RC, after_reset=True):  # a reader's own matplotlibrc changes nothing
         yield
+
+
+def save(figure: Figure, png: Path, pdf: Path) -> None:
+    """Save a figure as PNG (300 dpi) and PDF; no date inside, so that the same figure is the same file.
+
+    The PNG carries the line that stands below the figure, for its caption.
+    """
+    footer = " ".join(figure.get_supxlabel().split())
+    with applied():
+        with publish(png) as temporary:
+            figure.savefig(temporary, format="png", dpi=300, metadata={FOOTER: footer})
+        with publish(pdf) as temporary:
+            figure.savefig(temporary, format="pdf", metadata={"CreationDate": None})
 
 
 def panels(

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.units import FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 MILLISECOND = 1e-3
 INSET_SPAN = 0.03

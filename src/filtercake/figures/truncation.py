@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,11 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
+from filtercake.study.config.crystals import Csd
 from filtercake.units import MICROMETRE, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
-    from filtercake.study.config.crystals import Csd
 
 MOST_PANELS = 4
 KEPT, DISCARDED = style.colour(0), style.colour(1)

@@ -11,9 +11,10 @@ from PIL import Image
 
 from filtercake.figures import calibrated, selection
 from filtercake.figures.calibrated import CalibrationData
-from filtercake.figures.catalogue import FOOTER, StudyData
 from filtercake.figures.filtered import filtered
 from filtercake.figures.porosity_cohesion import FREE
+from filtercake.figures.selection import StudyData
+from filtercake.figures.style import FOOTER
 from filtercake.packing.result import publish
 from filtercake.report.pages import engine_names, environment
 from filtercake.report.words import heading, number, with_interval
