@@ -15,7 +15,7 @@ from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistanc
 from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.errors import ConfigError, Problem
 from filtercake.packing.engines.liggghts import template_folder
-from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates
+from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.result import Packing as SettledPacking
 from filtercake.packing.result import write_json
@@ -29,8 +29,6 @@ from filtercake.units import MICROSECOND
 SUMMARY = "summary.json"
 _OWN = re.compile(rf"r\d+\..*|\.r\d+\..*|\.work|{re.escape(MANIFEST)}|{re.escape(SUMMARY)}")
 """Names that packings and their records have."""
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Bed:
     warnings: tuple[str, ...]
 
 
-def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None, **options: Any) -> Bed:
+def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: None, **options: Any) -> Bed:
     """Pack spheres of a size distribution, and measure porosity and resistance.
 
     Packings that ``folder`` holds of the same arguments are kept, so that more of them, or a narrower interval, may be
@@ -112,7 +110,7 @@ def code_of(engine: str) -> str:
     return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
 
 
-def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Say) -> list[Outcome]:
+def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Report) -> list[Outcome]:
     def report(outcome: Outcome, record: dict[str, Any]) -> None:
         if outcome.status == "ok":
             say(f"r{outcome.replicate}: {record['steps']:,} steps, {record['wall_s']:.1f} s")

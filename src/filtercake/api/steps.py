@@ -17,7 +17,7 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from filtercake.crystals.crystallizer import SteadyState
-from filtercake.crystals.csd import CrystalSizeDistribution
+from filtercake.crystals.csd import CrystalSizeDistribution, kept_volume
 from filtercake.errors import ConfigError, FilterError, PackingRejected, Problem
 from filtercake.filtration.drum_filter import (
     DrumFilter,
@@ -78,7 +78,7 @@ class Distribution:
     @property
     def kept_volume_fraction(self) -> float:
         """Share of the crystal volume that is packed."""
-        return float(self.full.volume_fraction[np.isin(self.full.size, self.truncated.size)].sum())
+        return kept_volume(self.full, self.truncated)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from filtercake.errors import CsdError, shown
 from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, NUMBER, FloatArray, split_header
@@ -142,6 +142,17 @@ FullAndTruncated: TypeAlias = tuple[CrystalSizeDistribution, CrystalSizeDistribu
 """A distribution, whole and as it is packed."""
 
 
+def kept_classes(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> NDArray[np.bool_]:
+    """Whether each class of the full distribution is packed, shape (n,); sizes may differ by rounding."""
+    nearest = np.searchsorted(truncated.size, full.size * (1.0 - SAME_SIZE)).clip(max=truncated.size.size - 1)
+    return np.asarray(np.isclose(full.size, truncated.size[nearest], rtol=SAME_SIZE, atol=0.0))
+
+
+def kept_volume(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> float:
+    """Share of the crystal volume that is packed."""
+    return float(full.volume_fraction[kept_classes(full, truncated)].sum())
+
+
 @dataclass(frozen=True)
 class Truncation:
     """A truncated distribution and the volume it kept.
@@ -190,7 +201,7 @@ def truncate(
 
 def _nothing_left(
     csd: CrystalSizeDistribution,
-    inside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    inside: NDArray[np.bool_],
     share: float,
     smallest: float,
     largest: float,
@@ -295,7 +306,7 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
         Columns size_um, volume_fraction, number_fraction, x_over_d_1_m, x_over_d2_1_m2, truncated_volume_fraction,
         truncated_number_fraction; one row per class of the full distribution.
     """
-    inside = np.isin(full.size, truncated.size)
+    inside = kept_classes(full, truncated)
     volume, number = np.zeros(full.size.size), np.zeros(full.size.size)
     volume[inside], number[inside] = truncated.volume_fraction, truncated.number_fraction
     return pd.DataFrame(

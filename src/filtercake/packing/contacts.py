@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from filtercake.packing.cloud import size_levels
 from filtercake.units import FloatArray, IntArray
 
 
@@ -45,7 +46,7 @@ def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Co
     wrapped[:, :2][wrapped[:, :2] >= length] = 0.0
     wrapped[:, 2] -= wrapped[:, 2].min()
     box = np.array([length, length, 0.0])
-    level = np.floor(np.log2(radius.max() / radius)).astype(np.int64)
+    level = size_levels(radius)
     members = [np.flatnonzero(level == k) for k in np.unique(level)]
     trees = [cKDTree(wrapped[m], boxsize=box) for m in members]
     first, second, depth = [], [], []

@@ -24,6 +24,7 @@ WORK = ".work"
 """Scratch folder of a point's packings."""
 
 Report = Callable[[str], None]
+"""Takes a line about how far something is."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from filtercake.packing.result import publish
 from filtercake.report import words
 from filtercake.report.catalogue import PAGES
 from filtercake.study.config.study import Study
+from filtercake.user_files import templates
 
 FAILED_COLUMNS = ("point", "replicate", "csd", "cohesion_kJ_m3", "friction", "engine", "reason")
 
@@ -140,14 +141,8 @@ def prose(template: Path, title: str, body: str) -> str:
 
 
 def environment(folder: Path) -> jinja2.Environment:
-    """Templates of HTML in a folder: what they are given is text, and names that do not exist are errors."""
-    made = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
+    """Return the HTML templates of a folder, with the filters they use."""
+    made = templates(folder, html=True)
     made.filters |= {
         "readable": words.readable,
         "number": words.number,

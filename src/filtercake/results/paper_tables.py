@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.crystals.crystallizer import SteadyState
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
+from filtercake.crystals.csd import FullAndTruncated, kept_volume
 from filtercake.errors import CrystallizerError
 from filtercake.filtration.resistance import kozeny_carman
 from filtercake.packing.cloud import box_length
@@ -88,7 +88,7 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
     """Tabulate what each distribution keeps when classes are left out of the packing (paper, Table 2)."""
     rows = []
     for name, (full, truncated) in csds.items():
-        kept = np.isin(full.size, truncated.size)
+        kept = kept_volume(full, truncated)
         rows.append(
             {
                 "csd": name,
@@ -100,8 +100,8 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
                 "classes": truncated.size.size,
                 "smallest_um": round(truncated.smallest / MICROMETRE, 2),
                 "largest_um": round(truncated.largest / MICROMETRE, 2),
-                "kept_volume_fraction": _kept(full, truncated),
-                "discarded_volume_fraction": round(float(full.volume_fraction[~kept].sum()), 5),
+                "kept_volume_fraction": round(kept, 5),
+                "discarded_volume_fraction": round(max(1.0 - kept, 0.0), 5),
                 "published_smallest_um": _value(published_value(study, name, "smallest_um", "simulation")),
                 "published_largest_um": _value(published_value(study, name, "largest_um", "simulation")),
             }
@@ -145,15 +145,11 @@ def crystallizer_table(study: Study, states: Mapping[str, SteadyState], csds: Cs
             "nucleation_rate_1_L_s": state.nucleation_rate * LITRE,
             "size_scale_um": state.size_scale / MICROMETRE,
             "mass_mean_size_um": state.volume_mean / MICROMETRE,
-            "kept_volume_fraction": _kept(*csds[name]),
+            "kept_volume_fraction": round(kept_volume(*csds[name]), 5),
         }
         for name, state in sorted(states.items(), key=lambda item: item[1].residence_time)
     ]
     return pd.DataFrame(rows, columns=list(CRYSTALLIZER_COLUMNS))
-
-
-def _kept(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> float:
-    return round(float(full.volume_fraction[np.isin(full.size, truncated.size)].sum()), 5)
 
 
 def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import pandas as pd
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing import contact_law
 from filtercake.packing.engines.embedded import Embedded
-from filtercake.packing.pack import settle
+from filtercake.packing.pack import Report, settle
 from filtercake.packing.result import SettledState
 from filtercake.packing.scene import PackingSpec
 from filtercake.validation.timing import Contender, warm_up
@@ -22,8 +22,6 @@ SMALLEST = 20e-6
 """Diameter of the smallest class, m."""
 CLASSES = 10
 """Size classes, evenly spaced in log size, each with the same volume."""
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)

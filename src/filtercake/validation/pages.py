@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import pandas as pd
 
 from filtercake.study import limits
+from filtercake.user_files import templates
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
-from filtercake.validation.stability import COVERAGE, OUTCOMES, WRONG, families, undetected
+from filtercake.validation.stability import OUTCOMES, families, undetected, wrong
 
 INTERIOR, COUNT = "interior slab", "count"
 PAPER = "as published"
@@ -139,7 +139,6 @@ def stability(template: Path, table: pd.DataFrame) -> str:
     table : DataFrame
         Of :func:`filtercake.validation.stability.run`, all families.
     """
-    wrong = (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
     return _render(
         template,
         outcomes=OUTCOMES,
@@ -155,7 +154,7 @@ def stability(template: Path, table: pd.DataFrame) -> str:
         limits=vars(limits),
         total=len(table),
         absent=[name for name in families() if name not in set(table["family"])],
-        wrong=_records(table[wrong]),
+        wrong=_records(table[wrong(table)]),
         undetected=_records(undetected(table)),
         drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),
         gain=float(table.loc[(table["outcome"] == OK) & (table["fence"] == "allowed"), "energy_gain"].max()),
@@ -231,15 +230,7 @@ def _words(rows: pd.DataFrame) -> str:
 
 
 def _render(template: Path, **values: Any) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(template.parent),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # Markdown, from our own tables
-    )
-    return environment.get_template(template.name).render(**values)
+    return templates(template.parent).get_template(template.name).render(**values)
 
 
 def _records(table: pd.DataFrame) -> list[dict[str, Any]]:

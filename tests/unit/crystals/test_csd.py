@@ -16,6 +16,8 @@ from filtercake.crystals.csd import (
     CrystalSizeDistribution,
     discretise,
     from_table,
+    kept_classes,
+    kept_volume,
     mixture,
     read_csd,
     to_table,
@@ -463,3 +465,10 @@ def test_any_rows_are_a_distribution_or_a_csd_error(
 )
 def test_headers_are_split_into_name_and_unit(header: str, expected: tuple[str, str | None]) -> None:
     assert split_header(header) == expected
+
+
+def test_kept_classes_survive_the_rounding_of_a_change_of_unit() -> None:
+    full = mixture([10 * UM, 20 * UM, 30 * UM, 40 * UM], [0.1, 0.2, 0.3, 0.4])
+    truncated = mixture([30 * UM * (1.0 + 2e-16), 20 * UM * (1.0 - 1e-15)], [0.5, 0.5])
+    assert kept_classes(full, truncated).tolist() == [False, True, True, False]
+    assert kept_volume(full, truncated) == pytest.approx(0.5)
