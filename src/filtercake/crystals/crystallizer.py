@@ -129,11 +129,6 @@ class SteadyState:
     kinetics: str
 
     @property
-    def crystals_per_volume(self) -> float:
-        """Number of crystals per slurry volume, #/m3: ``B0 tau``."""
-        return self.nucleation_rate * self.residence_time
-
-    @property
     def number_mean(self) -> float:
         """Number mean size d10, m: ``G tau``."""
         return self.size_scale
@@ -188,46 +183,10 @@ def steady_state(kinetics: Kinetics, residence_time_s: float, slurry_concentrati
     return SteadyState(growth_rate, nucleation_rate, size_scale, residence_time, slurry_concentration, kinetics.name)
 
 
-def number_density(state: SteadyState, size: ArrayLike) -> FloatArray:
-    """Evaluate the number density b(L), #/(m3 m): ``(B0/G) exp(-L/(G tau))`` (paper eq. 11).
-
-    Parameters
-    ----------
-    state : SteadyState
-        The crystallizer.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    ndarray, shape (...)
-
-    Raises
-    ------
-    CrystallizerError
-        If a size is negative or not finite.
-    """
-    return np.asarray(state.nucleation_rate / state.growth_rate * np.exp(-_sizes(size) / state.size_scale))
-
-
 def volume_density(state: SteadyState, size: ArrayLike) -> FloatArray:
     """Evaluate the volume (= mass) density w(L), 1/m: ``L^3 exp(-L/a) / (6 a^4)`` with ``a = G tau``.
 
-    Parameters
-    ----------
-    state : SteadyState
-        The crystallizer.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    ndarray, shape (...)
-
-    Raises
-    ------
-    CrystallizerError
-        If a size is negative or not finite.
+    Sizes L in m, of any shape; a negative one or one that is not finite raises a CrystallizerError.
     """
     scaled = _sizes(size) / state.size_scale
     return np.asarray(scaled**3 * np.exp(-scaled) / (6.0 * state.size_scale))
@@ -236,34 +195,10 @@ def volume_density(state: SteadyState, size: ArrayLike) -> FloatArray:
 def cumulative_volume(size_scale: float, size: ArrayLike) -> FloatArray:
     """Volume fraction of crystals smaller than L: the regularised incomplete gamma function ``P(4, L/(G tau))``.
 
-    Parameters
-    ----------
-    size_scale : float
-        G tau, m.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    ndarray, shape (...)
-
-    Raises
-    ------
-    CrystallizerError
-        If the size scale is not positive and finite, or a size is negative or not finite.
+    Size scale G tau and sizes L in m; a size scale that is not positive and finite, or a size that is negative or not
+    finite, raises a CrystallizerError.
     """
     return np.asarray(gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
-
-
-def sum_x_over_d2(size_scale: float) -> float:
-    """Sum of x/d^2 over the full distribution, 1/m2 (paper eq. 3): the integral of w/L^2 is ``1/(6 (G tau)^2)``.
-
-    Raises
-    ------
-    CrystallizerError
-        If the size scale is not positive and finite.
-    """
-    return 1.0 / (6.0 * _checked("size_scale", size_scale, _positive) ** 2)
 
 
 def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -271,21 +206,7 @@ def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, Flo
 
     The integrals of w/L and w/L^2 up to L are ``P(3, L/a)/(3 a)`` and ``P(2, L/a)/(6 a^2)`` with ``a = G tau``.
 
-    Parameters
-    ----------
-    size_scale : float
-        G tau, m.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    tuple of ndarray, shape (...) each
-
-    Raises
-    ------
-    CrystallizerError
-        If the size scale is not positive and finite, or a size is negative or not finite.
+    Arguments and errors as of :func:`cumulative_volume`.
     """
     a = _checked("size_scale", size_scale, _positive)
     scaled = _sizes(size) / a

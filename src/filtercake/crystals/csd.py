@@ -115,20 +115,6 @@ class CrystalSizeDistribution:
         """Sauter mean diameter d32, m."""
         return 1.0 / self.sum_x_over_d
 
-    def mean_size(self, p: int, q: int) -> float:
-        """Moment mean diameter d_pq = (sum n d^p / sum n d^q)^(1/(p-q)), m (d10 number, d43 volume mean).
-
-        Raises
-        ------
-        ValueError
-            If p equals q.
-        """
-        if p == q:
-            raise ValueError("a moment mean needs two different orders p and q")
-        upper = float(np.sum(self.number_fraction * self.size**p))
-        lower = float(np.sum(self.number_fraction * self.size**q))
-        return float((upper / lower) ** (1.0 / (p - q)))
-
     def class_counts(self, particles: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         """Whole numbers of spheres per class that add up to ``particles``, by largest remainder, shape (n,)."""
         ideal = self.number_fraction * particles

@@ -119,10 +119,7 @@ def packed_friction(data: CalibrationData) -> float:
 def packed_at(data: CalibrationData, csd: str, friction: float) -> pd.DataFrame:
     """Average the accepted packings of a distribution and a friction by cohesion, all batches together.
 
-    Returns
-    -------
-    DataFrame
-        cohesion_kJ_m3, resistance_m_kg and resistance_ci95_m_kg; nan where no packing was accepted.
+    The columns are cohesion_kJ_m3, resistance_m_kg and resistance_ci95_m_kg, nan where no packing was accepted.
     """
     own = data.simulated[(data.simulated["csd"] == csd) & np.isclose(data.simulated["friction"], friction)]
     rows = []
@@ -142,7 +139,7 @@ def main_packings(data: CalibrationData, csds: Sequence[str]) -> pd.DataFrame:
 
 
 def fitted_packings(data: CalibrationData, *, rivals: bool = False) -> pd.DataFrame:
-    """Packings of the measured distributions behind the fit, and behind those of rival frictions too if asked for."""
+    """Packings of the measured distributions behind the fit; with ``rivals``, those of rival frictions too."""
     if rivals:
         return data.simulated[data.simulated["csd"].isin(data.measured)]
     return main_packings(data, data.measured)
@@ -155,21 +152,7 @@ def count(rows: pd.DataFrame) -> str:
 
 
 def footer(figure: Figure, data: CalibrationData, packings: Sequence[str], engines: Iterable[str], *notes: str) -> None:
-    """Say below a figure what was fitted to what, by how many packings of which engine.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    data : CalibrationData
-        What it shows.
-    packings : sequence of str
-        Packings in words (see :func:`count`).
-    engines : iterable of str
-        Engine of each.
-    *notes : str
-        What else there is to say.
-    """
+    """Write below a figure what was fitted, by which packings (see :func:`count`) and engines; and notes."""
     estimator = ESTIMATORS.get(data.summary["estimator"], data.summary["estimator"])
     what = "cohesion and friction fitted" if data.fits_friction else f"cohesion fitted at friction {data.friction:g}"
     names = ", ".join(style.ENGINES.get(name, name) for name in sorted({str(engine) for engine in engines}))

@@ -46,23 +46,12 @@ def draw(data: StudyData) -> Figure:
 
 
 def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Circles in which the plane at ``y`` cuts the spheres, periodic images included.
-
-    Parameters
-    ----------
-    packing : Packing
-        The packing, periodic in x and y.
-    y : float
-        Where the plane is, m.
+    """Circles in which the plane at ``y`` (m) cuts the spheres, periodic images in x and y included.
 
     Returns
     -------
-    centre : ndarray, shape (m, 2)
-        x and z of the circles' centres, m; the part of a circle beyond a side is drawn at the other.
-    cut_radius : ndarray, shape (m,)
-        Radii of the circles, m.
-    diameter : ndarray, shape (m,)
-        Diameters of the spheres, m.
+    tuple of ndarray
+        x and z of the circles' centres, shape (m, 2), their radii and the spheres' diameters, shape (m,), all in m.
     """
     length, position, radius = packing.length, packing.position, packing.radius
     offset = position[:, 1] - y

@@ -51,12 +51,7 @@ def draw(data: StudyData) -> Figure:
 
 
 def mean_profile(beds: list[Packing]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean porosity profile of beds and the half-width of its 95 % interval.
-
-    Parameters
-    ----------
-    beds : list of Packing
-        At least one.
+    """Mean porosity profile of one or more beds and the half-width of its 95 % interval.
 
     Returns
     -------

@@ -54,20 +54,10 @@ class StudyData:
     def read(
         cls, name: str, study: Mapping[str, Any], folder: Path, csds: Iterable[str], crystallizer: Iterable[str]
     ) -> StudyData:
-        """Read a study's tables.
+        """Read a study's tables from its results (points.csv, summary.csv, replicates.csv, packings).
 
-        Parameters
-        ----------
-        name : str
-            The study.
-        study : mapping
-            Its model's values.
-        folder : Path
-            Its results: points.csv, summary.csv, replicates.csv, packings.
-        csds : iterable of str
-            Tables of its distributions, named by them.
-        crystallizer : iterable of str
-            The crystallizer's table, if it has one.
+        ``study`` holds the values of its model, ``csds`` the tables of its distributions, named by them, and
+        ``crystallizer`` the crystallizer's table, if it has one.
         """
         return cls(
             name=name,
@@ -108,16 +98,9 @@ def main_point(data: StudyData) -> pd.Series[Any] | None:
 
 
 def varied(data: StudyData, free: tuple[str, ...], *names: str) -> list[tuple[str, pd.DataFrame]]:
-    """Distributions of which any of some properties varies, with their summary rows otherwise at the base material.
+    """Distributions of which any of the properties ``names`` varies, with their summary rows.
 
-    Parameters
-    ----------
-    data : StudyData
-        The study.
-    free : tuple of str
-        Properties that may differ from the base material.
-    *names : str
-        Properties of which one must vary.
+    Of all other properties only ``free`` may differ from the base material.
     """
     rows = base_rows(data.study, data.summary, free)
     by_csd = ((csd, rows[rows["csd"] == csd]) for csd in data.study.csds)

@@ -111,20 +111,10 @@ def panels(
     sharex: bool = False,
     sharey: bool = False,
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure with a grid of panels, row by row.
+    """Make a figure of ``width`` by ``height`` inches with ``count`` panels, row by row.
 
-    Parameters
-    ----------
-    count : int
-        Panels.
-    width, height : float
-        Size of the whole figure, in.
-    columns : int
-        Panels side by side.
-    ratios : sequence of float, optional
-        Relative heights of the rows.
-    sharex, sharey : bool
-        Whether all panels have the same axis.
+    ``ratios`` are the relative heights of the rows; ``sharex`` and ``sharey`` say whether all panels have the same
+    axis.
     """
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
@@ -172,19 +162,17 @@ def error_line(
     Parameters
     ----------
     axes : Axes
-        Where.
+        Panel.
     rows : DataFrame
-        The points of the series, in order.
+        Points of the series, in order.
     x, y : str
         Columns of the abscissa and the means.
     interval : str or tuple of str
-        Column of the half-widths of their intervals, or columns of the lower and the upper ends.
-    label : str
-        Name of the series.
-    index : int
-        Chooses colour and marker.
+        Column of the half-widths of the intervals, or columns of their lower and upper ends.
+    label, index : str, int
+        Name of the series; number that chooses its colour and marker.
     place, count : int
-        Which of how many series side by side it is.
+        Place of the series among ``count`` side by side.
     """
     positions, means = rows[x].to_numpy(np.float64), rows[y].to_numpy(np.float64)
     good = np.isfinite(means)
@@ -269,16 +257,7 @@ def published_level(axes: Axes, value: Published) -> None:
 def resistance_axis(axes: Axes, values: FloatArray, *, log: bool = False, factor: str = "") -> None:
     """Label the y axis as specific cake resistance in a power of ten of m/kg; the data stay in m/kg.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    values : ndarray
-        What is shown; the largest finite one chooses the power of ten.
-    log : bool
-        Whether the axis is logarithmic.
-    factor : str
-        Words before the unit.
+    The largest finite one of ``values`` chooses the power; ``factor`` is put before the unit.
     """
     if log:
         axes.set_yscale("log")
@@ -296,18 +275,9 @@ def volume_axis(axes: Axes, largest: float) -> None:
 
 
 def power_axis(axes: Axes, values: FloatArray, name: str, unit: str, *, otherwise: int = 0) -> None:
-    """Label the y axis in a power of ten of a unit; the data stay in the unit.
+    """Label the y axis with a name and a power of ten of a unit; the data stay in the unit.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    values : ndarray
-        What is shown; the largest finite one chooses the power of ten.
-    name, unit : str
-        What is shown (may end in a line break), and in what.
-    otherwise : int
-        The power of ten where no value is finite.
+    The largest finite one of ``values`` chooses the power, ``otherwise`` where none is finite.
     """
     finite = values[np.isfinite(values)]
     exponent = int(np.floor(np.log10(finite.max()))) if finite.size else otherwise
@@ -353,17 +323,7 @@ def key(label: str, **properties: Any) -> Line2D:
 
 
 def footer(figure: Figure, rows: pd.DataFrame, *notes: str) -> None:
-    """Say below a figure how many packings it shows, how many failed and what made them.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    rows : DataFrame
-        The rows of the summary it shows.
-    *notes : str
-        What else there is to say.
-    """
+    """Write below a figure what the summary's rows hold: packings, failures, engines; and notes."""
     parts = [describe_counts(rows), *notes] if len(rows) else list(notes)
     characters = int(figure.get_figwidth() * 21.0)
     text = "\n".join(textwrap.wrap("; ".join(part for part in parts if part), characters))

@@ -51,14 +51,7 @@ def draw(data: StudyData) -> Figure:
 
 
 def mean_trajectory(runs: list[dict[str, Any]], quantity: str) -> tuple[FloatArray, FloatArray]:
-    """Average trajectories of different lengths; a bed at rest stays as it was when its run stopped.
-
-    Parameters
-    ----------
-    runs : list of dict
-        Trajectories as recorded, with ``time_s`` and the quantity.
-    quantity : str
-        What to average.
+    """Average a quantity of trajectories of different lengths; a bed keeps its last value when its run has stopped.
 
     Returns
     -------

@@ -12,18 +12,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 
 def to_html(text: str) -> str:
-    """Convert Markdown to HTML.
-
-    Parameters
-    ----------
-    text : str
-        CommonMark with tables; formulas in LaTeX between dollars. HTML in it is shown as text.
-
-    Returns
-    -------
-    str
-        The inside of a page's body.
-    """
+    """Convert CommonMark with tables, and LaTeX between dollars, to the body of an HTML page; HTML becomes text."""
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.use(dollarmath_plugin, renderer=_formula)
     tokens = parser.parse(text)

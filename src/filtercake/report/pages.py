@@ -49,7 +49,7 @@ def engine_names(engines: Iterable[str]) -> str:
 
 
 def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Mapping[str, Any]) -> dict[str, Content]:
-    """Collect the pages of a study or a calibration.
+    """Collect the pages of a study or a calibration, by the names of :data:`filtercake.report.catalogue.PAGES`.
 
     Parameters
     ----------
@@ -61,11 +61,6 @@ def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Map
         The study that was packed.
     provenance : mapping
         As ``provenance.json`` holds it (versions, machine, commit).
-
-    Returns
-    -------
-    dict of str to Content
-        By the names of :data:`filtercake.report.catalogue.PAGES`.
     """
     found = {}
     for name, spec in PAGES.items():
@@ -114,17 +109,7 @@ def origin(packings: pd.DataFrame, provenance: Mapping[str, Any]) -> Content:
 
 
 def write(template: Path, pages: Mapping[str, Content], target: Path) -> None:
-    """Write pages as HTML, each named as in :data:`filtercake.report.catalogue.PAGES`.
-
-    Parameters
-    ----------
-    template : Path
-        Template of all pages.
-    pages : mapping of str to Content
-        The pages.
-    target : Path
-        Folder to write to.
-    """
+    """Write pages as HTML into ``target``, each named as in :data:`filtercake.report.catalogue.PAGES`."""
     for name, content in pages.items():
         with publish(target / f"{name}.html") as temporary:
             temporary.write_text(render(template, PAGES[name].title, content), encoding="utf-8")

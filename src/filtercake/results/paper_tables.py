@@ -112,19 +112,9 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
 def crystallizer_table(study: Study, states: Mapping[str, SteadyState], csds: Csds) -> pd.DataFrame:
     """Tabulate the crystallizer at every residence time, shortest first (paper, Figs 12 and 13).
 
-    Parameters
-    ----------
-    study : Study
-        Has the slurry flow that makes a volume of a residence time.
-    states : mapping of str to SteadyState
-        The crystallizer behind each of its products.
-    csds : dict of str to (CrystalSizeDistribution, CrystalSizeDistribution)
-        All distributions, full and truncated.
-
-    Returns
-    -------
-    DataFrame
-        :data:`CRYSTALLIZER_COLUMNS`; the mean size is weighted by mass.
+    ``states`` holds the crystallizer behind each of its products. The columns are :data:`CRYSTALLIZER_COLUMNS`; the
+    mean
+    size is weighted by mass.
 
     Raises
     ------

@@ -68,16 +68,7 @@ SUMMARY_COLUMNS = (
 def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, sphericity: float) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
-    Parameters
-    ----------
-    point : Point
-        Where it belongs.
-    packing : Packing
-        The packing.
-    csd : (CrystalSizeDistribution, CrystalSizeDistribution)
-        The full distribution, which the resistance needs all of, and the truncated one, for comparison.
-    sphericity : float
-        For the resistance law.
+    The resistance is that of the full distribution; that of the truncated one is kept for comparison.
     """
     found, record = measure(packing, point.spec), packing.diagnostics
     (full, truncated), law = csd, (point.spec.density, sphericity)
@@ -116,16 +107,7 @@ def replicates_table(
 ) -> pd.DataFrame:
     """Measure every packing of a study, ``REPLICATE_COLUMNS``; a failed or damaged one is a row with a reason.
 
-    Parameters
-    ----------
-    points : iterable of Point
-        The study's points.
-    packings : Path
-        Folder with one folder per point.
-    csds : mapping of str to (CrystalSizeDistribution, CrystalSizeDistribution)
-        The full and truncated distributions by name.
-    sphericity : float
-        For the resistance law.
+    ``packings`` holds one folder per point; ``sphericity`` is for the resistance law.
     """
     rows = []
     for point in points:

@@ -73,18 +73,9 @@ def _wide_intervals(summary: Path) -> Iterator[str]:
 
 
 def failure(results: Path, points: Points, since: float, cluster_logs: Path | None = None) -> str:
-    """Name the jobs that failed, their reasons and logs, and the command that resumes.
+    """Name the jobs that failed since the run's start (s since the epoch), their reasons and logs, and how to resume.
 
-    Parameters
-    ----------
-    results : Path
-        Folder of the results.
-    points : mapping
-        Points by study and name.
-    since : float
-        When the run started, s since the epoch: older logs speak of older runs.
-    cluster_logs : Path, optional
-        Folder of a cluster's own logs; it keeps those of submissions that failed.
+    A cluster keeps logs of its own, in ``cluster_logs``; among them are those of submissions that failed.
     """
     lines = []
     for study in points:
