@@ -123,11 +123,6 @@ def export(study: str, point: str, results: str | Path, output: str | Path, repl
 def rerun(folder: str | Path) -> PackingPorosity:
     """Make an exported packing once more, in the folder ``rerun`` of the export.
 
-    Parameters
-    ----------
-    folder : str or Path
-        What :func:`export` wrote.
-
     Raises
     ------
     ConfigError

@@ -70,7 +70,7 @@ def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: No
     folder : str or Path
         Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
     say : callable
-        Takes a line about each packing as it comes.
+        Takes a line about each packing.
     **options
         The keys of the configuration's blocks ``material`` and ``packing``.
 

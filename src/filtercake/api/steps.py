@@ -286,12 +286,7 @@ def filter_area(**options: Any) -> FilterSize:
 
 
 def porosity(npz: str | Path) -> PackingPorosity:
-    """Measure a packing's porosity.
-
-    Parameters
-    ----------
-    npz : str or Path
-        The packing; its record (``.json``) lies beside it.
+    """Measure a packing's porosity; its record (``.json``) lies beside the ``npz`` file.
 
     Raises
     ------
@@ -319,22 +314,7 @@ def porosity(npz: str | Path) -> PackingPorosity:
 def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> pd.DataFrame:
     """Tabulate a packing's porosity over height, in exact slices from the floor to the topmost sphere.
 
-    Parameters
-    ----------
-    npz : str or Path
-        The packing.
-    slices_per_diameter : int
-        Slices in one largest diameter.
-
-    Returns
-    -------
-    DataFrame
-        Columns height_um (of a slice's middle) and porosity.
-
-    Raises
-    ------
-    PackingRejected
-        As for :func:`porosity`.
+    The columns are height_um (of a slice's middle) and porosity; errors are those of :func:`porosity`.
     """
     packing, _ = load_packing(Path(npz))
     top = float((packing.position[:, 2] + packing.radius).max())
@@ -370,12 +350,7 @@ def load_packing(npz: Path) -> tuple[Packing, PackingSpec]:
 
 
 def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mapping[str, Any]) -> LoadedStudy:
-    """Check a study of one point.
-
-    Parameters
-    ----------
-    source, material, packing : mapping
-        Arguments of :func:`distribution`, and those of the configuration's blocks.
+    """Check a study of one point: the arguments of :func:`distribution`, and the blocks ``material`` and ``packing``.
 
     Raises
     ------

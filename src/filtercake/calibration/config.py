@@ -229,14 +229,7 @@ def _path_problem(path: Path, same: Path | None, folder: Path) -> str:
 
 
 def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
-    """Read and check a calibration, its study and its measurements.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    studies : Path
-        Folder where studies are looked up by name.
+    """Read and check a calibration, its study (looked up by name in ``studies``) and its measurements.
 
     Raises
     ------

@@ -207,10 +207,7 @@ def simulate(
 ) -> pd.DataFrame:
     """Tabulate every packing made, with its ln(alpha) by the estimator asked for.
 
-    Returns
-    -------
-    DataFrame
-        The rows of :func:`filtercake.results.replicates.replicates_table` with the columns batch and ln_resistance.
+    The columns are those of :func:`filtercake.results.replicates.replicates_table`, batch and ln_resistance.
     """
     listed = list(candidates)
     table = replicates_table([c.point for c in listed], packings, csds, settings.sphericity)
@@ -234,25 +231,11 @@ def choose_round(
     observations: Sequence[Observation],
     simulated: pd.DataFrame | None,
 ) -> Round:
-    """Decide what to pack next.
+    """Decide what to pack in a round (numbered from 0), given the points of earlier rounds and what they gave.
 
     The first round is coarse. Later ones refine the cohesion where the interval still is, and, when every candidate
-    there has been packed, add a batch of replicates.
-
-    Parameters
-    ----------
-    number : int
-        Of the round, from 0.
-    settings : Settings
-        Of the calibration.
-    candidates : sequence of Candidate
-        All points there may be.
-    visited : sequence of str
-        Points of earlier rounds.
-    observations : sequence of Observation
-        What was measured.
-    simulated : DataFrame or None
-        What was packed (see :func:`simulate`); None before the first round.
+    there
+    has been packed, add a batch of replicates.
     """
     own = [c for c in candidates if c.point.csd in settings.measured]
     if number == 0 or simulated is None:
@@ -553,18 +536,14 @@ def prediction_table(
 
     Parameters
     ----------
-    outcome : Outcome
+    outcome, settings : Outcome, Settings
         The calibration.
-    settings : Settings
-        Its settings.
     simulated : DataFrame
         Packings of the distributions to predict (see :func:`simulate`).
     csds : mapping of str to CrystalSizeDistribution
         The full distributions.
-    drum : DrumFilter or None
-        Filter whose area is wanted.
-    slurry_flow : float
-        Slurry that it must take, m3/s.
+    drum, slurry_flow : DrumFilter or None, float
+        Filter whose area is wanted, and the slurry that it must take, m3/s.
 
     Raises
     ------

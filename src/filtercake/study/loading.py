@@ -162,14 +162,7 @@ def load_study(path: Path) -> LoadedStudy:
 
 
 def check_study(values: Any, path: Path) -> LoadedStudy:
-    """Check a study's values, however they were given.
-
-    Parameters
-    ----------
-    values : Any
-        What the study's file holds.
-    path : Path
-        Its file, for messages and for the files it names.
+    """Check a study's values, however they were given; the path is for messages and for the files they name.
 
     Raises
     ------
@@ -216,16 +209,7 @@ def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
 
 
 def parse(model: type[M], values: Any, file: str) -> M:
-    """Check the values of a YAML file against its model.
-
-    Parameters
-    ----------
-    model : type of BaseModel
-        What the file must be.
-    values : Any
-        What :func:`~filtercake.user_files.read_yaml` returned.
-    file : str
-        Its name, for messages.
+    """Check what :func:`~filtercake.user_files.read_yaml` returned for a file against the model of that file.
 
     Raises
     ------
