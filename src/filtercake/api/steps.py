@@ -19,24 +19,18 @@ from pydantic import Field, model_validator
 from filtercake.crystals.crystallizer import SteadyState
 from filtercake.crystals.csd import CrystalSizeDistribution, kept_volume
 from filtercake.errors import ConfigError, FilterError, PackingRejected, Problem
-from filtercake.filtration.drum_filter import (
-    DrumFilter,
-    area,
-    cake_mass_per_area,
-    cake_thickness,
-    capacity,
-    medium_share,
-)
+from filtercake.filtration.drum_filter import area, cake_mass_per_area, cake_thickness, capacity, medium_share
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman, log_sensitivity
 from filtercake.packing.cloud import NARROW_PARTICLES
 from filtercake.packing.porosity import measure, porosity_profile
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import PackingSpec
 from filtercake.packing.slab import bed_height
+from filtercake.results.filter_design import drum_filter
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.values import TO_NUMBER, Density, Model
 from filtercake.study.loading import LoadedStudy, check_study, parse
-from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
+from filtercake.units import HOUR, MICROMETRE
 
 ORIGIN = Path("options")
 """Stands for the study file in messages about arguments; files that arguments name are looked up from here."""
@@ -432,7 +426,7 @@ def _check_sums(study: LoadedStudy) -> None:
 
 
 def _size(given: FilterOptions) -> FilterSize:
-    drum, alpha = _drum(given), given.resistance_m_kg
+    drum, alpha = drum_filter(given, given.slurry_concentration_kg_m3), given.resistance_m_kg
     thickness = None
     if given.porosity is not None and given.density_kg_m3 is not None:
         thickness = float(cake_thickness(drum, alpha, given.porosity, given.density_kg_m3)) / MILLIMETRE
@@ -448,17 +442,6 @@ def _size(given: FilterOptions) -> FilterSize:
         medium_share=float(medium_share(drum, alpha)),
         cake_mass_kg_m2=float(cake_mass_per_area(drum, alpha)),
         cake_thickness_mm=thickness,
-    )
-
-
-def _drum(given: FilterOptions) -> DrumFilter:
-    return DrumFilter(
-        pressure_drop=given.pressure_drop_kPa * KILOPASCAL,
-        submerged_fraction=given.submerged_fraction,
-        rotation_rate=given.rotation_rate_rpm / MINUTE,
-        medium_resistance=given.medium_resistance_1_m,
-        viscosity=given.viscosity_mPa_s * MILLIPASCAL_SECOND,
-        slurry_concentration=given.slurry_concentration_kg_m3,
     )
 
 

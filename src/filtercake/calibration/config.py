@@ -153,8 +153,6 @@ class LoadedCalibration:
         Mean porosity that the measured resistances imply.
     frictions : tuple of float
         Those packed: one and its rivals, or all that the fit of the friction needs.
-    warnings : tuple of str
-        What is allowed but doubtful.
     """
 
     name: str
@@ -166,7 +164,11 @@ class LoadedCalibration:
     doubts: tuple[Finding, ...]
     implied_porosity: float
     frictions: tuple[float, ...]
-    warnings: tuple[str, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed but doubtful."""
+        return self.study.warnings
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -262,7 +264,6 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
         doubts=tuple(_measured_doubts(measurements, model.pressure_kPa)),
         implied_porosity=porosity,
         frictions=_frictions(model, porosity, len({item.csd for item in observations})),
-        warnings=warnings,
     )
 
 

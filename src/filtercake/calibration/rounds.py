@@ -109,6 +109,11 @@ class Settings:
         return len(self.parameters) > 1
 
     @property
+    def fixed_friction(self) -> float | None:
+        """Coefficient of friction of the fit that counts; None where it is fitted."""
+        return None if self.fits_friction else self.frictions[0]
+
+    @property
     def main_frictions(self) -> tuple[float, ...]:
         """Frictions of the fit that counts, without rivals."""
         return self.frictions if self.fits_friction else self.frictions[:1]
@@ -337,7 +342,7 @@ def fit_main(settings: Settings, observations: Sequence[Observation], simulated:
 
 
 def _main_responses(settings: Settings, simulated: pd.DataFrame) -> dict[str, Response]:
-    friction = None if settings.fits_friction else settings.frictions[0]
+    friction = settings.fixed_friction
     responses = responses_at(settings, simulated, settings.measured, friction)
     shortage = _shortage(settings.measured, responses, simulated, friction)
     if shortage:
@@ -370,9 +375,7 @@ def conclude(settings: Settings, observations: Sequence[Observation], simulated:
     """
     main = _main_responses(settings, simulated)
     fit = calibrate(observations, main)
-    by_friction: dict[float | None, dict[str, Response]] = {
-        None if settings.fits_friction else settings.frictions[0]: main
-    }
+    by_friction: dict[float | None, dict[str, Response]] = {settings.fixed_friction: main}
     rivals = {} if settings.fits_friction else {settings.frictions[0]: fit}
     skipped = []
     for mu in () if settings.fits_friction else settings.frictions[1:]:
@@ -435,7 +438,7 @@ def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
             e.parameter.name: {"value": e.value, "low": e.low, "high": e.high, "regions": e.regions}
             for e in fit.estimates
         },
-        "friction": None if settings.fits_friction else settings.frictions[0],
+        "friction": settings.fixed_friction,
         "chi_square": fit.chi_square,
         "degrees_of_freedom": fit.degrees_of_freedom,
         "discrepancy": fit.discrepancy,
@@ -463,7 +466,7 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
     ``left_out_m_kg`` is the resistance that the other distributions predict for this one; ``left_out_ln_error`` its
     error, in ln(alpha), against the weighted mean of the distribution's measurements.
     """
-    friction = None if settings.fits_friction else settings.frictions[0]
+    friction = settings.fixed_friction
     means = pooled(observations)
     rows = []
     for item in observations:
@@ -550,7 +553,7 @@ def prediction_table(
     CalibrationError
         If a distribution has not enough packings.
     """
-    friction = None if settings.fits_friction else settings.frictions[0]
+    friction = settings.fixed_friction
     responses = responses_at(settings, simulated, settings.predicted, friction)
     shortage = _shortage(settings.predicted, responses, simulated, friction)
     if shortage:

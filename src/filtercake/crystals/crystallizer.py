@@ -7,7 +7,6 @@ distribution. Nucleation rate B0 and growth rate G follow from the kinetics (eqs
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.special import gammainc
 
 from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
-from filtercake.errors import ConfigError, CrystallizerError, Problem, shown
+from filtercake.errors import ConfigError, CrystallizerError, Problem, did_you_mean, shown
 from filtercake.units import MICROMETRE, MINUTE, FloatArray
 from filtercake.user_files import read_yaml
 
@@ -213,9 +212,7 @@ def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, Flo
     return np.asarray(gammainc(3.0, scaled) / (3.0 * a)), np.asarray(gammainc(2.0, scaled) / (6.0 * a**2))
 
 
-def crystal_size_distribution(
-    size_scale: float, bin_width: float = BIN_WIDTH, upper_scales: float = UPPER_SCALES
-) -> CrystalSizeDistribution:
+def crystal_size_distribution(size_scale: float, bin_width: float = BIN_WIDTH) -> CrystalSizeDistribution:
     """Cut the product into size classes of about ``bin_width`` (paper section 3.1, Fig 5, before truncation).
 
     Every class adds to the sums of x/d and x/d^2 what its crystals do, not what as many at its centre would: that
@@ -227,8 +224,6 @@ def crystal_size_distribution(
         G tau, m.
     bin_width : float
         Wanted class width, m; the width used divides the largest size into a whole number of classes.
-    upper_scales : float
-        Largest size considered, in size scales.
 
     Raises
     ------
@@ -237,7 +232,7 @@ def crystal_size_distribution(
     CsdError
         If a class is wider than the largest size.
     """
-    upper = _checked("size_scale", size_scale, _positive) * _checked("upper_scales", upper_scales, _positive)
+    upper = _checked("size_scale", size_scale, _positive) * UPPER_SCALES
     width = _checked("bin_width", bin_width, _positive)
     if upper > MOST_CLASSES * width:
         raise CrystallizerError(
@@ -445,8 +440,7 @@ def _read_entry(name: Any, entry: Any, file: str) -> tuple[dict[str, Any], list[
 
 def _unknown(what: str, word: str, known: Iterable[str]) -> str:
     names = list(known)
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
-    return f"no such {what}; allowed: {', '.join(names)}" + (f"; did you mean {close[0]}?" if close else "")
+    return f"no such {what}; allowed: {', '.join(names)}{did_you_mean(word, names)}"
 
 
 def _shown(value: Any) -> str:

@@ -11,7 +11,6 @@ from matplotlib.ticker import LogLocator
 from filtercake.calibration.rounds import SAFETY_FACTOR
 from filtercake.figures import calibrated, style
 from filtercake.figures.calibrated import CalibrationData
-from filtercake.figures.calibration_parity import resistance_abscissa
 
 RESISTANCE = ("resistance_m_kg", "resistance_low_m_kg", "resistance_high_m_kg", "resistance_with_safety_factor_m_kg")
 AREA = ("filter_area_m2", "filter_area_low_m2", "filter_area_high_m2", "filter_area_with_safety_factor_m2")
@@ -39,7 +38,7 @@ def draw(data: CalibrationData) -> Figure:
         sharey=True,
     )
     _rows(panels[0], table, RESISTANCE)
-    resistance_abscissa(panels[0], table[RESISTANCE[0]].to_numpy(np.float64))
+    style.resistance_axis(panels[0], table[RESISTANCE[0]].to_numpy(np.float64), log=True, abscissa=True)
     if table[RESISTANCE[3]].max() < DECADE * table[RESISTANCE[1]].min():
         panels[0].xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)))
     panels[0].set_title(calibrated.panel_title(data, 45 if filtered else 75), loc="left")

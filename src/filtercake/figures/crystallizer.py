@@ -27,8 +27,8 @@ def draw(data: StudyData) -> Figure:
     for k, axes in enumerate(panels):
         axes.plot(*_power_laws(volumes, rates[:, k]), "-", color=style.colour(k), gid="curve")
         axes.plot(volumes, rates[:, k], "o", color=style.colour(k), gid="study")
-    style.power_axis(upper, rates[:, 0], "Growth rate G\n", "m/s")
-    style.power_axis(lower, rates[:, 1], "Nucleation rate B₀\n", "#/(L s)")
+    style.power_axis(upper.yaxis, rates[:, 0], "Growth rate G\n", "m/s")
+    style.power_axis(lower.yaxis, rates[:, 1], "Nucleation rate B₀\n", "#/(L s)")
     for k, axes in enumerate(panels):
         axes.set_ylim(0.0, 1.08 * rates[:, k].max())
     keys = [

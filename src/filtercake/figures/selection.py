@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,8 @@ from filtercake.study.config.published import Published
 from filtercake.study.config.study import Study
 from filtercake.study.points import base_rows
 from filtercake.units import LITRE, MICROMETRE, MINUTE
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -133,35 +135,26 @@ def products(data: StudyData) -> list[tuple[str, float, SteadyState]]:
 
 def records(data: StudyData, point: str) -> tuple[list[tuple[int, dict[str, Any]]], str]:
     """Read the records of a point's accepted packings, with their replicates, and a note on the unreadable ones."""
-    found, lost = [], 0
-    for replicate, npz in _accepted(data, point):
-        try:
-            found.append((replicate, read_record(npz.with_suffix(".json"))))
-        except PackingRejected:
-            lost += 1
-    return found, _note(lost)
+    return _accepted(data, point, lambda npz: read_record(npz.with_suffix(".json")))
 
 
 def packings(data: StudyData, point: str, most: int | None = None) -> tuple[list[tuple[int, Packing]], str]:
     """Read a point's accepted packings (the first few), with their replicates, and a note on the unreadable ones."""
-    found: list[tuple[int, Packing]] = []
+    return _accepted(data, point, Packing.load, most)
+
+
+def _accepted(
+    data: StudyData, point: str, read: Callable[[Path], T], most: int | None = None
+) -> tuple[list[tuple[int, T]], str]:
+    rows = data.replicates
+    good = rows[(rows["point"] == point) & (rows["status"] == "ok")]
+    found: list[tuple[int, T]] = []
     lost = 0
-    for replicate, npz in _accepted(data, point):
+    for replicate in sorted(good["replicate"].astype(int)):
         if len(found) == most:
             break
         try:
-            found.append((replicate, Packing.load(npz)))
+            found.append((replicate, read(data.packings / point / f"r{replicate}.npz")))
         except PackingRejected:
             lost += 1
-    return found, _note(lost)
-
-
-def _accepted(data: StudyData, point: str) -> Iterator[tuple[int, Path]]:
-    rows = data.replicates
-    good = rows[(rows["point"] == point) & (rows["status"] == "ok")]
-    for replicate in sorted(good["replicate"].astype(int)):
-        yield replicate, data.packings / point / f"r{replicate}.npz"
-
-
-def _note(lost: int) -> str:
-    return f"{lost} packing{'' if lost == 1 else 's'} could not be read" if lost else ""
+    return found, f"{lost} packing{'' if lost == 1 else 's'} could not be read" if lost else ""

@@ -13,6 +13,7 @@ import pandas as pd
 from matplotlib import style as mpl_style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
@@ -254,16 +255,19 @@ def published_level(axes: Axes, value: Published) -> None:
     )
 
 
-def resistance_axis(axes: Axes, values: FloatArray, *, log: bool = False, factor: str = "") -> None:
-    """Label the y axis as specific cake resistance in a power of ten of m/kg; the data stay in m/kg.
+def resistance_axis(
+    axes: Axes, values: FloatArray, *, log: bool = False, factor: str = "", abscissa: bool = False
+) -> None:
+    """Label the y axis, or the abscissa, as specific cake resistance in a power of ten of m/kg; the data stay in m/kg.
 
     The largest finite one of ``values`` chooses the power; ``factor`` is put before the unit.
     """
+    axis = axes.xaxis if abscissa else axes.yaxis
     if log:
-        axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-    power_axis(axes, values, f"Specific cake resistance{factor}", "m/kg", otherwise=9)
+        axes.set(**{"xscale" if abscissa else "yscale": "log"})
+        axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
+        axis.set_minor_formatter(NullFormatter())
+    power_axis(axis, values, f"Specific cake resistance{factor}", "m/kg", otherwise=9)
 
 
 def volume_axis(axes: Axes, largest: float) -> None:
@@ -274,15 +278,15 @@ def volume_axis(axes: Axes, largest: float) -> None:
         axes.set_xlim(0.0, 1.06 * largest)
 
 
-def power_axis(axes: Axes, values: FloatArray, name: str, unit: str, *, otherwise: int = 0) -> None:
-    """Label the y axis with a name and a power of ten of a unit; the data stay in the unit.
+def power_axis(axis: Axis, values: FloatArray, name: str, unit: str, *, otherwise: int = 0) -> None:
+    """Label an axis with a name and a power of ten of a unit; the data stay in the unit.
 
     The largest finite one of ``values`` chooses the power, ``otherwise`` where none is finite.
     """
     finite = values[np.isfinite(values)]
     exponent = int(np.floor(np.log10(finite.max()))) if finite.size else otherwise
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
-    axes.set_ylabel(f"{name} ({power_of_ten(exponent)} {unit})".replace("\n ", "\n"))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
+    axis.set_label_text(f"{name} ({power_of_ten(exponent)} {unit})".replace("\n ", "\n"))
 
 
 def power_of_ten(exponent: int) -> str:

@@ -8,6 +8,7 @@ import pandas as pd
 from filtercake.errors import FilterError
 from filtercake.filtration.drum_filter import Cake, DrumFilter, area, design_table
 from filtercake.results.paper_tables import Csds, published_value
+from filtercake.study.config.filter import Filter
 from filtercake.study.config.study import Study
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
 
@@ -64,11 +65,16 @@ def drum_of(study: Study) -> DrumFilter:
     """
     if study.filter is None or study.crystallizer is None:
         raise FilterError("the study has no filter: add the sections crystallizer and filter")
+    return drum_filter(study.filter, study.crystallizer.slurry_concentration_kg_m3)
+
+
+def drum_filter(settings: Filter, slurry_concentration: float) -> DrumFilter:
+    """Return a drum filter for a slurry with so many kg of crystals per m3, in SI."""
     return DrumFilter(
-        pressure_drop=study.filter.pressure_drop_kPa * KILOPASCAL,
-        submerged_fraction=study.filter.submerged_fraction,
-        rotation_rate=study.filter.rotation_rate_rpm / MINUTE,
-        medium_resistance=study.filter.medium_resistance_1_m,
-        viscosity=study.filter.viscosity_mPa_s * MILLIPASCAL_SECOND,
-        slurry_concentration=study.crystallizer.slurry_concentration_kg_m3,
+        pressure_drop=settings.pressure_drop_kPa * KILOPASCAL,
+        submerged_fraction=settings.submerged_fraction,
+        rotation_rate=settings.rotation_rate_rpm / MINUTE,
+        medium_resistance=settings.medium_resistance_1_m,
+        viscosity=settings.viscosity_mPa_s * MILLIPASCAL_SECOND,
+        slurry_concentration=slurry_concentration,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
 from collections.abc import Iterable
@@ -14,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
-from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, shown
+from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import bed_for
 from filtercake.study import limits
@@ -131,7 +130,7 @@ def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
             problems.append(Problem(file, key, repr(study), "a study's file name must be letters, digits, - and _"))
         elif not is_file(path):
             allowed = f"no such study; allowed: {', '.join(known)}, or the path of a study file"
-            problems.append(Problem(file, key, repr(study), allowed + _did_you_mean(study, known)))
+            problems.append(Problem(file, key, repr(study), allowed + did_you_mean(study, known)))
         elif path.stem in [other.stem for other in paths]:
             problems.append(Problem(file, key, repr(study), "two studies of the same name; rename one file"))
         elif _is_own(path, folder.parent / "benchmarks"):
@@ -233,7 +232,7 @@ def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
     if item["type"] == "extra_forbidden":
         allowed = _allowed_keys(model, location[:-1])
         new = next((name for name in RENAMED.get(str(location[-1]), ()) if name in allowed), None)
-        message = f"unknown key; allowed here: {', '.join(allowed)}{_did_you_mean(str(location[-1]), allowed)}"
+        message = f"unknown key; allowed here: {', '.join(allowed)}{did_you_mean(str(location[-1]), allowed)}"
         if new is not None:
             message = f"is now called {new}"
     elif item["type"] == "missing":
@@ -270,11 +269,6 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
-
-
-def _did_you_mean(word: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"; did you mean {close[0]}?" if close else ""
 
 
 def _source_of(name: str, csd: Csd) -> tuple[str, str]:
@@ -336,7 +330,7 @@ def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
     named += [(f"published[{i}].csd", entry.csd) for i, entry in enumerate(model.published)]
     for key, name in named:
         if name not in model.csds:
-            allowed = f"not in csds; allowed: {', '.join(known)}{_did_you_mean(name, known)}"
+            allowed = f"not in csds; allowed: {', '.join(known)}{did_you_mean(name, known)}"
             yield Problem(file, key, repr(name), allowed)
 
 
