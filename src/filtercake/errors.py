@@ -18,7 +18,7 @@ _SHORT.maxstring = _SHORT.maxother = LONGEST_SHOWN
 
 
 def shown(value: Any) -> str:
-    """Show a value in a message, shortened, however large or deep a file makes it."""
+    """Text of a value for a message, shortened however large or deep it is."""
     try:
         text = _SHORT.repr(value)
     except ValueError:  # an int of more digits than Python writes
@@ -27,7 +27,7 @@ def shown(value: Any) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Name the known word that is nearly the one given, as the end of a message; empty where there is none."""
+    """End of a message that proposes the known word nearest to the one given; empty where none is near."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f"; did you mean {close[0]}?" if close else ""
 
@@ -49,7 +49,7 @@ class FiltercakeError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong with one input.
+    """One invalid value of an input.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Problem:
     value : str
         The offending value as the user wrote it.
     allowed : str
-        What would be accepted instead.
+        Values that are accepted.
     """
 
     file: str
@@ -74,7 +74,7 @@ class Problem:
 
 
 class ConfigError(FiltercakeError):
-    """The configuration is wrong; holds every problem found, and lists the first ``MOST_SHOWN``."""
+    """The configuration is invalid; holds every problem found and lists the first ``MOST_SHOWN``."""
 
     def __init__(self, problems: Sequence[Problem]):
         self.problems = tuple(problems)

@@ -45,7 +45,7 @@ class Exported:
     Attributes
     ----------
     folder : Path
-        Where it is.
+        Folder of the export.
     point : str
         Name of the point.
     replicate : int
@@ -95,7 +95,7 @@ def export(study: str, point: str, results: str | Path, output: str | Path, repl
     output : str or Path
         The folder, which must not exist.
     replicate : int, optional
-        Which packing; the first that failed, or 0, if left out.
+        Number of the packing; the first that failed, or 0, if left out.
 
     Raises
     ------

@@ -45,9 +45,9 @@ class Bed:
     files : tuple of Path
         The accepted packings.
     failures : tuple of str
-        Why others were not.
+        Reasons of the failed packings.
     warnings : tuple of str
-        What is allowed but doubtful about the arguments.
+        Doubts about allowed arguments.
     """
 
     summary: dict[str, Any]
@@ -70,7 +70,7 @@ def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: No
     folder : str or Path
         Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
     say : callable
-        Takes a line about each packing.
+        Receives a line per packing.
     **options
         The keys of the configuration's blocks ``material`` and ``packing``.
 

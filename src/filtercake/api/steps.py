@@ -35,7 +35,7 @@ from filtercake.units import HOUR, MICROMETRE
 ORIGIN = Path("options")
 """Stands for the study file in messages about arguments; files that arguments name are looked up from here."""
 CSD = "csd"
-"""Name of the one distribution."""
+"""Name of the distribution in the study of one point."""
 CRYSTALLIZER_OPTIONS = ("kinetics", "kinetics_file", "slurry_concentration_kg_m3", "bin_width_um")
 PLAIN_DENSITY = 1000.0
 """Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it, or from the spheres
@@ -136,7 +136,7 @@ class PackingPorosity:
     particles : int
         Number of spheres.
     engine : str
-        What settled them.
+        Name of the engine.
     """
 
     porosity: float
@@ -385,7 +385,7 @@ def _distribution(study: LoadedStudy, options: dict[str, Any]) -> Distribution:
 
 
 def _source_problems(source: Mapping[str, Any]) -> Sequence[Problem]:
-    """Find what a distribution lacks or has too much of."""
+    """Missing, surplus and contradictory arguments of a distribution."""
     known = ("mixture", "file", "residence_time_min", *CRYSTALLIZER_OPTIONS)
     cuts = ("truncate_below_volume_fraction", "truncate_below_um", "truncate_above_um")
     problems = [

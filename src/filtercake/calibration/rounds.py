@@ -47,14 +47,14 @@ CURVE_POINTS = 101
 
 @dataclass(frozen=True)
 class Settings:
-    """What a calibration's jobs need to know.
+    """Settings of a calibration's jobs.
 
     Attributes
     ----------
     parameters : tuple of Parameter
         The fitted ones.
     frictions : tuple of float
-        Those packed; where the friction is not fitted, the first is the one taken and the rest are its rivals.
+        Frictions of the packings; unless the friction is fitted, the first is the one taken, the rest its rivals.
     measured, predicted : tuple of str
         Distributions with measurements, and those whose resistance is predicted.
     cohesions : tuple of float
@@ -62,17 +62,17 @@ class Settings:
     estimator : {"interior", "paper_count"}
         Porosity that the measured resistance is held against.
     rounds : int
-        At most so many rounds of packings.
+        Largest number of rounds of packings.
     relative_ci95_target : float
         Half-width of the cohesion's interval over its value that ends them.
     density, sphericity : float
-        Of the crystals, kg/m3 and 1.
+        Density (kg/m3) and sphericity of the crystals.
     implied_porosity : float
         Mean porosity that the measured resistances imply.
     soft_above : float
         Cohesion from which the softness of the contacts matters, kJ/m3.
     doubts : tuple of Finding
-        What must be known of the measurements themselves.
+        Doubts about the measurements.
     """
 
     parameters: tuple[Parameter, ...]
@@ -134,7 +134,7 @@ class Round:
     Attributes
     ----------
     points : tuple of str
-        What to pack.
+        Names of the points to pack.
     finished : bool
         Whether it is the last: then there is nothing to pack.
     why : str
@@ -159,7 +159,7 @@ class Outcome:
     left_out : dict of str to float
         Error of predicting each distribution from the others, in ln(alpha).
     findings : tuple of Finding
-        What a user must know.
+        Findings about the fit.
     responses : dict of (str, float or None) to Response
         ln(alpha) by distribution and fixed friction (None where it is fitted).
     """
@@ -173,7 +173,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Task:
-    """What a calibration's job is given: its settings, measurements and candidates."""
+    """Input of a calibration's job."""
 
     settings: Settings
     observations: tuple[Observation, ...]
@@ -353,7 +353,7 @@ def _main_responses(settings: Settings, simulated: pd.DataFrame) -> dict[str, Re
 def _shortage(
     wanted: Sequence[str], found: Mapping[str, Response], simulated: pd.DataFrame, friction: float | None
 ) -> str:
-    """Say which distributions have too few accepted packings for a smooth model, and how many; empty if none."""
+    """Distributions with too few accepted packings for a smooth model, in words; empty if none."""
     rows = simulated if friction is None else simulated[np.isclose(simulated["friction"], friction)]
     counts = []
     for name in [name for name in wanted if name not in found]:
@@ -399,7 +399,7 @@ def conclude(settings: Settings, observations: Sequence[Observation], simulated:
 
 
 def _untested(settings: Settings) -> tuple[Finding, ...]:
-    """Say where the measurements have no say in the friction."""
+    """Return the finding that the measurements cannot test the friction, where they cannot."""
     if len(settings.measured) > 1 or len(settings.frictions) > 1:
         return ()
     text = f"one measured distribution cannot test the friction taken, {settings.frictions[0]:g}: a cohesion makes up"
@@ -407,7 +407,7 @@ def _untested(settings: Settings) -> tuple[Finding, ...]:
 
 
 def _advice(settings: Settings, fit: Calibration) -> tuple[Finding, ...]:
-    """Say where the friction taken is not the paper's advice for the measured cakes."""
+    """Return the finding that the friction taken is not the one the paper advises, where it is not."""
     advised = advised_friction(settings.implied_porosity)
     taken = fit.best[1] if settings.fits_friction else settings.frictions[0]
     if settings.fits_friction or np.isclose(taken, advised):

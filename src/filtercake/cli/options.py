@@ -38,7 +38,7 @@ class UsageError(FiltercakeError):
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, without the usage text."""
+    """Reports errors in one line, without the usage text."""
 
     def __init__(self, **settings: Any):
         settings.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
@@ -97,7 +97,7 @@ def source(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def in_words(error: FiltercakeError, known: Iterable[str]) -> str:
-    """Say an error in one line, with options where it names keys of the configuration."""
+    """Text of an error in one line, with options in place of keys of the configuration."""
     if isinstance(error, UsageError):
         return str(error)
     names = set(known)
@@ -114,7 +114,7 @@ def with_flags(text: str, known: Iterable[str]) -> str:
 
 
 def unknown(words: list[str], known: Iterable[str]) -> str:
-    """Say that words are no options, and what may have been meant."""
+    """Message about unknown options, with the nearest known one."""
     word = words[0].partition("=")[0]
     return f"unknown argument {words[0]!r}{did_you_mean(word, known)}"
 

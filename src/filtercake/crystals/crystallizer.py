@@ -61,7 +61,7 @@ class Kinetics:
     density : float
         Crystal density, kg/m3; positive.
     source : str
-        Where the values are from.
+        Source of the values.
     residence_time_range : tuple of float or None
         Shortest and longest residence time the kinetics are meant for, s; None where the source states none.
 
@@ -307,7 +307,7 @@ def _sizes(size: ArrayLike) -> FloatArray:
 
 
 def _checked(name: str, value: Any, check: Callable[[Any], T]) -> T:
-    """Pass a value through its check and name it if that fails."""
+    """Check a value; the error names it."""
     try:
         return check(value)
     except ValueError as error:
@@ -379,7 +379,7 @@ _CHECKS: Final[dict[str, Callable[[Any], Any]]] = {
     "source": _text,
     "residence_time_range": _range,
 }
-"""What each attribute of the kinetics must pass."""
+"""Check of each attribute of the kinetics."""
 
 _ATTRIBUTES: Final[dict[str, str]] = {
     "nucleation_coefficient": "nucleation_coefficient",

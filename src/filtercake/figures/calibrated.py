@@ -21,7 +21,7 @@ from filtercake.packing.replication import half_width
 Z = float(special.ndtri(0.5 + 0.5 * CONFIDENCE))
 """Standard errors from an estimate to the end of its 95 % interval."""
 ESTIMATORS = {"interior": "interior porosity", "paper_count": "porosity counted as in the paper"}
-"""Names of estimators for readers; one that is not listed keeps its own."""
+"""Names of estimators in figures; one that is not listed keeps its own."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class CalibrationData:
     labels : dict of str to str
         Names of the distributions for readers; their order chooses colours and markers.
     measurements : Measurements or None
-        What was measured, for the figures of the tests.
+        Measurements, for the figures of the tests.
     """
 
     name: str
@@ -89,7 +89,7 @@ class CalibrationData:
         return known.index(csd) if csd in known else len(known)
 
     def label(self, csd: str, characters: int = 40) -> str:
-        """Name of a distribution for readers, in lines of so many characters."""
+        """Label of a distribution, wrapped to a number of characters."""
         return textwrap.fill(self.labels.get(csd) or csd, characters)
 
 

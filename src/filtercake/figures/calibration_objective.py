@@ -1,4 +1,4 @@
-"""How well each cohesion (and friction) describes the measurements, and what must be known of the answer."""
+"""Deviance of each cohesion (and friction) from the measurements, and the findings about the fit."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def _interval(axes: Axes, data: CalibrationData) -> None:
 
 
 def stretches(values: FloatArray, deviance: FloatArray) -> list[tuple[float, float]]:
-    """Find where a deviance on a grid is under the threshold: the ends of every stretch, ascending."""
+    """Return the ends of every stretch in which a deviance on a grid is under the threshold, ascending."""
     excess = deviance - THRESHOLD
     inside = np.concatenate([[False], excess <= 0.0, [False]])
     first, last = np.flatnonzero(~inside[:-1] & inside[1:]), np.flatnonzero(inside[:-1] & ~inside[1:]) - 1

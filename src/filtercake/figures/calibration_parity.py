@@ -50,7 +50,7 @@ def draw(data: CalibrationData) -> Figure:
 
 
 def typical_errors(means: pd.DataFrame) -> str:
-    """Say how far the model is from the measured means of the distributions: root mean square of the ln error."""
+    """Root mean square of the ln errors against the measured means of the distributions, in words."""
     measured = np.log(means["measured_m_kg"].to_numpy(np.float64))
     words = []
     for column, what in (("modelled_m_kg", "modelled"), ("left_out_m_kg", "predicted from the others")):

@@ -94,7 +94,7 @@ def _footer(figure: Figure, data: CalibrationData, table: pd.DataFrame) -> None:
 
 
 def _covered(data: CalibrationData, table: pd.DataFrame) -> str:
-    """Say whether the safety factor covers the intervals."""
+    """Whether the safety factor covers the intervals, in words."""
     beyond = table[table["high_over_resistance"] > SAFETY_FACTOR]
     if beyond.empty:
         most = float(table["high_over_resistance"].max())

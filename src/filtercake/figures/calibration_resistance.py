@@ -48,7 +48,7 @@ def draw(data: CalibrationData) -> Figure:
 
 
 def _friction(data: CalibrationData, friction: float) -> str:
-    """Say where the packings shown are not of the curves' friction."""
+    """Note that the packings shown have another friction than the curves; empty where they have the same."""
     if np.isclose(friction, data.friction):
         return ""
     return f"packings are those at friction {friction:g}, the nearest to the {data.friction:.3g} of the curves"

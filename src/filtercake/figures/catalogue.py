@@ -1,4 +1,4 @@
-"""Which figures there are, which of them a study or a calibration has, and how one is drawn.
+"""Registry of the figures of studies and calibrations.
 
 A new figure is one module with ``draw(data) -> Figure`` and one line in ``FIGURES`` or ``CALIBRATION_FIGURES``.
 """

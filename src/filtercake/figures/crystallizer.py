@@ -41,7 +41,7 @@ def draw(data: StudyData) -> Figure:
 
 
 def _power_laws(volume: FloatArray, rate: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Join rates by what they are: powers of the residence time, and so straight between logarithms."""
+    """Interpolate rates as power laws of the residence time: linearly between logarithms."""
     sampled = np.geomspace(volume[0], volume[-1], 201)
     return sampled, np.exp(np.interp(np.log(sampled), np.log(volume), np.log(rate)))
 

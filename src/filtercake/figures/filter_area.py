@@ -56,7 +56,7 @@ def published(axes: Axes, data: StudyData, table: pd.DataFrame, quantity: str, s
 
 
 def fall(table: pd.DataFrame) -> str:
-    """Say by how much resistance and area fall from the smallest to the largest crystallizer."""
+    """Change of resistance and area from the smallest to the largest crystallizer, in words."""
     good = table[table["resistance_m_kg"].notna()]
     if len(good) < 2:
         return ""
@@ -69,7 +69,7 @@ def fall(table: pd.DataFrame) -> str:
 
 
 def operating_point(data: StudyData) -> str:
-    """Say in words where the filter works."""
+    """Operating point of the filter, in words."""
     drum = data.study.filter
     if drum is None:
         return ""

@@ -149,7 +149,7 @@ def _logarithmic(axes: Axes) -> None:
 
 
 def _same_limits(panels: list[Axes], table: pd.DataFrame) -> None:
-    """Give the panels the same areas, so that areas compare across pressure drops."""
+    """Set the same ordinate in all panels, so that areas compare across pressure drops."""
     known = table["resistance_m_kg"].notna().any()
     limits = [axes.get_ylim() for axes in panels] if known else [EMPTY]
     lowest, highest = zip(*limits, strict=True)

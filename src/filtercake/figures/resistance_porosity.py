@@ -109,5 +109,5 @@ def _published(axes: Axes, data: StudyData, csd: str) -> list[Line2D]:
 
 
 def _origin(value: Published) -> tuple[object, ...]:
-    """Tell which published values belong together."""
+    """Key that published values of one experiment or simulation share."""
     return value.source, value.kind, value.cohesion_kJ_m3, value.friction

@@ -74,13 +74,13 @@ class StudyData:
 
 
 def label(data: StudyData, csd: str) -> str:
-    """Name of a distribution for readers."""
+    """Label of a distribution."""
     known = data.study.csds.get(csd)
     return (known.label if known else None) or csd
 
 
 def number(data: StudyData, csd: str) -> int:
-    """Place of a distribution in the study: it has the same colour in every figure."""
+    """Index of a distribution in the study; it sets its colour in every figure."""
     return list(data.study.csds).index(csd)
 
 

@@ -1,4 +1,4 @@
-"""How every figure looks: sizes, colours, markers, and the parts that figures share."""
+"""House style of the figures: sizes, colours, markers, and shared parts."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ ENGINES = {
     "liggghts_as_published": "LIGGGHTS (protocol as published)",
     "embedded": "embedded engine",
 }
-"""Names of engines for readers; one that is not listed keeps its own."""
+"""Names of engines in figures and tables; one that is not listed keeps its own."""
 
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
@@ -344,7 +344,7 @@ def describe_counts(rows: pd.DataFrame) -> str:
 
 
 def nothing(axes: Axes, reason: str) -> None:
-    """Say in the middle of empty axes why there is nothing to see."""
+    """Write into empty axes why they are empty."""
     sentence = "\n".join(textwrap.wrap(reason, 38))
     plate = {"facecolor": "white", "edgecolor": "none"}
     axes.text(0.5, 0.5, sentence, transform=axes.transAxes, ha="center", va="center", color=FAINT, bbox=plate, zorder=9)

@@ -76,7 +76,7 @@ _ERGUN_INERTIAL: Final = 1.75
 
 
 class _Rule(NamedTuple):
-    """What a quantity may be; comparisons with nan are false, so no rule accepts it."""
+    """Range of a quantity; comparisons with nan are false, so that no rule accepts it."""
 
     accepts: Callable[[FloatArray], np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]
     text: str
@@ -134,7 +134,7 @@ class DrumFilter:
 
 @dataclass(frozen=True)
 class Cake:
-    """What packing and size distribution say of a cake.
+    """Properties of a cake from its packing and size distribution.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Cake:
 
     @property
     def known(self) -> bool:
-        """Whether there is a packing behind it."""
+        """Whether porosity and resistance are known."""
         return not (math.isnan(self.resistance) or math.isnan(self.porosity))
 
 
@@ -281,7 +281,7 @@ def particle_reynolds(
 
 
 def model_warnings(drum: DrumFilter, cake: Cake, liquid_density: float = WATER_DENSITY) -> list[str]:
-    """Say in plain words where filter or model leave their range; empty where all is well or no cake is known.
+    """Warnings where filter or model leave their range; empty where none do or no cake is known.
 
     The density of the filtrate is in kg/m3.
 
@@ -421,7 +421,7 @@ def _require(name: str, value: ArrayLike, unit: str, rule: _Rule) -> FloatArray:
 
 
 def _problem(name: str, value: ArrayLike, unit: str, rule: _Rule) -> str | None:
-    """Say what is wrong with the first value a rule does not accept, None where it accepts all."""
+    """Message about the first value that a rule does not accept, None where it accepts all."""
     values = np.atleast_1d(np.asarray(value, dtype=np.float64))
     bad = values[~rule.accepts(values)]
     return f"{f'{name} = {bad[0]:g} {unit}'.rstrip()}: {rule.text}" if bad.size else None

@@ -47,13 +47,13 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
     Parameters
     ----------
     state : SettledState
-        What the engine returned.
+        Result of the engine.
     spec : PackingSpec
-        What was asked for.
+        Specification of the packing.
     cloud : Cloud
         The initial cloud.
     rule : StopRule
-        When a bed counts as settled.
+        Stop rule.
 
     Raises
     ------

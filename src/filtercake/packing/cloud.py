@@ -95,7 +95,7 @@ def box_length(
 
 @dataclass(frozen=True)
 class BedSize:
-    """How large a bed of a distribution has to be."""
+    """Number of spheres and relative depth of a bed."""
 
     particles: int
     bed_depth_factor: float

@@ -24,12 +24,12 @@ WORK = ".work"
 """Scratch folder of a point's packings."""
 
 Report = Callable[[str], None]
-"""Takes a line about how far something is."""
+"""Receives a line of progress."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one replicate.
+    """Outcome of one replicate.
 
     Attributes
     ----------
@@ -38,13 +38,13 @@ class Outcome:
     status : {"ok", "failed"}
         Whether there is an accepted packing.
     reason : str
-        Why not; empty where there is one.
+        Reason of the failure; empty for an accepted packing.
     seed : int
         Seed of the initial cloud.
     sha256 : str
         Checksum of the geometry file; empty where there is none.
     attempts : int
-        How often it was tried.
+        Number of attempts.
     may_pass : bool
         Whether it failed for a reason outside the packing (program killed or missing, disk full, time limit), so that
         another run may make it.
@@ -117,16 +117,16 @@ def pack(
 
 @dataclass(frozen=True)
 class Settled:
-    """What an engine made of a cloud, accepted or not.
+    """Result of an engine with what it started from, accepted or not.
 
     Attributes
     ----------
     state : SettledState
         The engine's result.
     cloud : Cloud
-        What it started from.
+        Initial cloud.
     rule : StopRule
-        When the bed was to stop.
+        Stop rule.
     seed : int
         Seed of the cloud.
     """

@@ -27,7 +27,7 @@ def _formula(latex: str, options: dict[str, Any]) -> str:
 
 
 def _unlink(tokens: Sequence[Token]) -> None:
-    """Turn links to other files of the project into text: a report has no such files beside it."""
+    """Replace links to other files of the project by text: a report has no such files beside it."""
     local = False
     for token in tokens:
         if token.type == "link_open":

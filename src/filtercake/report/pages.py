@@ -23,12 +23,12 @@ FAILED_COLUMNS = ("point", "replicate", "csd", "cohesion_kJ_m3", "friction", "en
 
 @dataclass(frozen=True)
 class Content:
-    """What a page shows below its title.
+    """Content of a page below its title.
 
     Attributes
     ----------
     lead : str
-        What it holds, in prose.
+        Introductory prose.
     table : DataFrame
         Its table, empty for none.
     csv : bytes
@@ -97,7 +97,7 @@ def failed(packings: pd.DataFrame) -> Content:
 
 
 def origin(packings: pd.DataFrame, provenance: Mapping[str, Any]) -> Content:
-    """Say what made the results: engine, versions, machine, commit, and the seed of every packing."""
+    """Tabulate the origin of the results: engine, versions, machine, commit, and the seed of every packing."""
     versions = pd.DataFrame(provenance["versions"].items(), columns=["package", "version"])
     machine = pd.DataFrame(provenance["machine"].items(), columns=["machine", "value"])
     lead = (

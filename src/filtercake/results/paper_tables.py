@@ -204,7 +204,7 @@ def _value(published: Published | None) -> float:
 
 
 def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
-    """Set every published porosity simulated at a visited point beside ours by the same estimator.
+    """Compare published simulated porosities at visited points with ours by the same estimator.
 
     ``sd`` is the standard deviation of one packing, pooled over the study's points of the same engine: a few
     replicates of one point say little about it. ``deviation_sd`` is the published value's distance from our mean

@@ -1,4 +1,4 @@
-"""What came out of a study: one row per packing, then one per point with means and intervals."""
+"""Results of a study: one row per packing, then one per point with means and intervals."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
 
 
 def _reached(half: float, asked: float) -> str:
-    """Say whether an interval is as narrow as asked; nothing where none was asked for."""
+    """Whether an interval is as narrow as its target ("yes", "no"); empty without a target."""
     if np.isnan(asked):
         return ""
     return "yes" if half <= asked else "no"

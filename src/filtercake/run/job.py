@@ -1,4 +1,4 @@
-"""What every job of a workflow needs: a log, an orderly end, and a word about progress."""
+"""Frame of every job of a workflow: log, orderly end, progress."""
 
 from __future__ import annotations
 

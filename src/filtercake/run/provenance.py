@@ -1,4 +1,4 @@
-"""Where results come from: the library files behind a module, and the versions behind a run."""
+"""Provenance of results: the library files behind a module, and the versions behind a run."""
 
 from __future__ import annotations
 

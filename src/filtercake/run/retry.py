@@ -11,7 +11,7 @@ from filtercake.packing.pack import MANIFEST
 from filtercake.run import checksums
 
 LAST = ("provenance.json", "replicates.csv", "calibration.json")
-"""What stands at the end of a study or calibration; while it stands, Snakemake looks for nothing behind it."""
+"""Last files of a study or calibration; while one exists, Snakemake looks for nothing behind it."""
 
 
 def forget_failures(results: Path, *, may_pass: bool = False) -> list[str]:

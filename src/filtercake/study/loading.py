@@ -1,4 +1,4 @@
-"""Read configuration files and say everything that is wrong with them at once: file, key, value, what is allowed."""
+"""Read and check configuration files; every problem is reported at once, with file, key, value and allowed values."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ OWN_NAMES = ("benchmark", "benchmark_quick", "benchmark_redrawn", "benchmarks", 
 """Folders of the results that are the workflow's own: no study can have such a name."""
 
 OWN_PREFIXES = ("agreement_", "calibration_")
-"""How the names begin of the studies that the workflow makes itself."""
+"""First parts of the names of studies that the workflow makes itself."""
 
 _OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
 
@@ -88,7 +88,7 @@ class LoadedStudy:
     csds : dict of str to LoadedCsd
         Its distributions.
     warnings : tuple of str
-        What is allowed but doubtful.
+        Doubts about allowed values.
     """
 
     name: str

@@ -42,7 +42,7 @@ class Point:
     replicates : int
         Packings asked for; at least so many where an interval is asked for.
     spec : PackingSpec
-        What is packed.
+        Specification of the packings.
     porosity_ci95_target : float or None
         Half-width of the porosity's 95 % interval, down to which packings are added.
     max_replicates : int

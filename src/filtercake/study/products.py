@@ -1,4 +1,4 @@
-"""What a crystallizer gives a study: a distribution per residence time, and the density of the crystals."""
+"""Products of a crystallizer: a distribution per residence time, and the density of the crystals."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def slurry_problems(model: Study, file: str) -> Iterator[Problem]:
 
 
 def _without_crystallizer(model: Study, file: str) -> Iterator[Problem]:
-    """Name what only a crystallizer could give."""
+    """Keys that need a crystallizer, in a study without one."""
     asked = [
         f"csds.{name}.residence_time_min" for name, csd in model.csds.items() if csd.residence_time_min is not None
     ]

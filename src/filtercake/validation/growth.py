@@ -31,7 +31,7 @@ class Case:
     Attributes
     ----------
     series : {"particles", "size_ratio"}
-        What grows.
+        Quantity that is varied.
     particles : int
         Number of spheres.
     size_ratio : float
@@ -62,9 +62,9 @@ def time_growth(base: PackingSpec, cases: Iterable[Case], report: Report = lambd
     base : PackingSpec
         Material and protocol; the number of spheres and the time step follow the case.
     cases : iterable of Case
-        What is timed, in this order.
+        Beds that are timed, in this order.
     report : callable
-        Takes a line per case.
+        Receives a line per case.
 
     Returns
     -------

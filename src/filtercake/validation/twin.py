@@ -33,7 +33,7 @@ def repeat_calibrations(
     noise : float
         Relative standard deviation of a measurement, which the calibration is told.
     seed : int
-        Of the noise.
+        Seed of the noise.
 
     Returns
     -------

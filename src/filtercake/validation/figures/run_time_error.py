@@ -21,7 +21,7 @@ CASES = {
     "alum_wide": "Alum 15 min, N = 20 000",
 }
 AXES = ("time step", "spheres", "stop tolerance", "skin", "engine", "softer contacts", "truncation")
-"""What a variant differs in, in the order of colours."""
+"""Properties in which variants differ, in the order of colours."""
 AS_PUBLISHED = "as published"
 INTERIOR, COUNT = "interior slab", "count"
 REPLICATES = (1, 2, 4, 8, 16, 32)
