@@ -213,17 +213,11 @@ def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, Flo
 
 
 def crystal_size_distribution(size_scale: float, bin_width: float = BIN_WIDTH) -> CrystalSizeDistribution:
-    """Cut the product into size classes of about ``bin_width`` (paper section 3.1, Fig 5, before truncation).
+    """Cut the product of size scale G tau (m) into size classes of about ``bin_width`` (m; paper section 3.1, Fig 5).
 
-    Every class adds to the sums of x/d and x/d^2 what its crystals do, not what as many at its centre would: that
-    would be 0.5 % more resistance for the paper's alum.
-
-    Parameters
-    ----------
-    size_scale : float
-        G tau, m.
-    bin_width : float
-        Wanted class width, m; the width used divides the largest size into a whole number of classes.
+    Every class adds to the sums of x/d and x/d^2 what its crystals do, not what as many at its centre would: that would
+    be
+    0.5 % more resistance for the paper's alum. The width used divides the largest size into a whole number of classes.
 
     Raises
     ------

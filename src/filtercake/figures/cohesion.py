@@ -32,16 +32,9 @@ def draw(
 ) -> Figure:
     """Draw a quantity with its 95 % interval, a second estimate, and published values.
 
-    Parameters
-    ----------
-    data : StudyData
-        The study.
-    columns : tuple of str
-        The quantity and the half-width of its interval.
-    beside : Beside
-        The second estimate.
-    label : callable
-        Labels a panel's ordinate, given the values it shows.
+    ``columns`` are those of the quantity and the half-width of its interval; ``label`` labels a panel's ordinate, given
+    the
+    values it shows.
     """
     cases = selection.varied(data, FREE, "cohesion_kJ_m3")
     count = max(len(cases), 1)

@@ -30,16 +30,8 @@ class Contacts:
 def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Contacts:
     """Find every overlapping pair in a box periodic in x and y.
 
-    Spheres are searched by size level (factor 2), so that a wide distribution costs no more than its contacts.
-
-    Parameters
-    ----------
-    position : ndarray, shape (n, 3)
-        Centres, m.
-    radius : ndarray, shape (n,)
-        Radii, m.
-    length : float
-        Side of the periodic box, m.
+    Spheres are searched by size level, so that a wide distribution costs no more than its contacts. Positions (n, 3),
+    radii (n,) and the side of the box in m.
     """
     wrapped = position.copy()
     wrapped[:, :2] %= length

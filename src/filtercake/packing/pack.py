@@ -91,12 +91,10 @@ def pack(
         Number of the replicate; decides the seed.
     folder : Path
         Empty scratch folder for the engine's files.
-    engine : Engine, optional
-        Used instead of the one the spec names.
-    progress : callable
-        Takes a line about a long packing.
+    engine, progress : Engine, callable, optional
+        Used instead of the engine that the spec names; receives a line about a long packing.
     state_file : Path, optional
-        Where a long packing keeps its state, to go on from there when it was stopped.
+        Keeps the state of a long packing, which goes on from there when it was stopped.
 
     Raises
     ------
@@ -171,25 +169,19 @@ def pack_replicates(
     progress: Report = lambda _: None,
     enough: Callable[[Path], bool] = lambda _: False,
 ) -> list[Outcome]:
-    """Make a point's replicates in ``folder`` and write their manifest last.
+    """Make at most so many replicates of a point in ``folder`` and write their manifest last.
 
-    Finished replicates are kept when the same point is run again, unless the spec, the distribution or the
-    code changed; a packing that fails is an outcome with a reason, not an error.
+    Finished replicates are kept when the same point is run again, unless the spec, the distribution or the code (whose
+    hash is ``code``) changed; a packing that fails is an outcome with a reason, not an error.
 
     Parameters
     ----------
-    spec, csd
+    spec, csd, progress
         As for :func:`pack`.
-    replicates : int
-        How many, at most.
-    folder : Path
-        Receives r<k>.npz, r<k>.json and the manifest.
-    code : str
-        Hash of the code and decks behind the packing.
+    replicates, folder, code
+        As said above; the folder receives r<k>.npz, r<k>.json and the manifest.
     report : callable
-        Called with every outcome and its record as it comes.
-    progress : callable
-        Takes a line about a long packing.
+        Receives every outcome and its record.
     enough : callable
         Called with the geometry file of every accepted packing; says whether no further one is needed.
 

@@ -16,12 +16,10 @@ from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
 def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     """Tabulate the drum filter that every point's slurry needs (paper, eq. 10 and Fig. 14).
 
-    Returns
-    -------
-    DataFrame
-        Per point: crystallizer volume, porosity and resistance, the columns of
-        :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 %
-        interval, and the published area.
+    The columns are crystallizer volume, porosity and resistance, those of
+    :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 % interval,
+    and
+    the published area.
 
     Raises
     ------

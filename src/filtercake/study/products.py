@@ -33,21 +33,11 @@ def product_name(residence_time_min: float) -> str:
 def resolve(model: Study, path: Path) -> tuple[Study, Kinetics | None, list[str]]:
     """Give the residence times of sweeps a distribution each, and the material the kinetics' density if it has none.
 
-    Parameters
-    ----------
-    model : Study
-        The study as it is written.
-    path : Path
-        Its file.
-
     Returns
     -------
-    Study
-        With a distribution for every product; published values of other kinetics are left out.
-    Kinetics or None
-        The crystallizer's.
-    list of str
-        Warnings.
+    tuple of Study, Kinetics or None, list of str
+        The study with a distribution for every product, without published values of other kinetics; the crystallizer's
+        kinetics; warnings.
 
     Raises
     ------
