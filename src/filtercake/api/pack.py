@@ -12,14 +12,13 @@ from typing import Any
 import pandas as pd
 
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
+from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
 from filtercake.packing.engines.liggghts import template_folder
 from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates
 from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.result import Packing as SettledPacking
 from filtercake.packing.result import write_json
-from filtercake.results.replicates import REPLICATE_COLUMNS, failed_row, replicate_row, summarise
+from filtercake.results.replicates import REPLICATE_COLUMNS, replicate_rows, summarise
 from filtercake.run.provenance import code_hash, packing_sources, versions
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
@@ -92,7 +91,7 @@ def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: No
     resistance(source, porosity=0.01, density_kg_m3=point.spec.density, sphericity=study.model.material.sphericity)
     outcomes = _make(point, csd.truncated, path, say)
     sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
-    rows = [_row(point, outcome, path, sizes, sphericity) for outcome in outcomes]
+    rows = list(replicate_rows(point, outcomes, path, sizes, sphericity))
     table = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
     summary = _summary(table, point)
     write_json(path / SUMMARY, {**summary, "versions": versions()})
@@ -122,12 +121,6 @@ def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Report)
     if interval is not None:
         enough = UntilNarrow(point.spec, interval, point.replicates)
     return pack_replicates(point.spec, csd, point.most_replicates, folder, code, report, say, enough)
-
-
-def _row(point: Point, outcome: Outcome, folder: Path, sizes: FullAndTruncated, sphericity: float) -> dict[str, Any]:
-    if outcome.status != "ok":
-        return failed_row(point, outcome, outcome.reason)
-    return replicate_row(point, SettledPacking.load(folder / f"r{outcome.replicate}.npz"), sizes, sphericity)
 
 
 def _summary(table: pd.DataFrame, point: Point) -> dict[str, Any]:

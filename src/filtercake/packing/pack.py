@@ -169,7 +169,7 @@ def pack_replicates(
     progress: Report = lambda _: None,
     enough: Callable[[Path], bool] = lambda _: False,
 ) -> list[Outcome]:
-    """Make at most so many replicates of a point in ``folder`` and write their manifest last.
+    """Make the replicates of a point in ``folder`` and write their manifest last.
 
     Finished replicates are kept when the same point is run again, unless the spec, the distribution or the code (whose
     hash is ``code``) changed; a packing that fails is an outcome with a reason, not an error.
@@ -178,8 +178,10 @@ def pack_replicates(
     ----------
     spec, csd, progress
         As for :func:`pack`.
-    replicates, folder, code
-        As said above; the folder receives r<k>.npz, r<k>.json and the manifest.
+    replicates : int
+        Largest number of packings.
+    folder : Path
+        Receives r<k>.npz, r<k>.json and the manifest.
     report : callable
         Receives every outcome and its record.
     enough : callable
