@@ -7,7 +7,7 @@ import pandas as pd
 
 from filtercake.errors import FilterError
 from filtercake.filtration.drum_filter import Cake, DrumFilter, area, design_table
-from filtercake.results.paper_tables import Csds, published_value
+from filtercake.results.paper_tables import Csds, published_number
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.study import Study
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
@@ -48,8 +48,7 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
         ends = (table["resistance_m_kg"] + sign * table["resistance_ci95_m_kg"]).clip(lower=smallest)
         known = ends.notna()
         table.loc[known, name] = area(drum, ends[known].to_numpy(np.float64), flow)
-    published = (published_value(study, name, "filter_area_m2", "simulation") for name in names)
-    table["published_area_m2"] = [float("nan") if entry is None else entry.value for entry in published]
+    table["published_area_m2"] = [published_number(study, name, "filter_area_m2", "simulation") for name in names]
     return table
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -55,6 +54,12 @@ def published_value(study: Study, csd: str, quantity: str, kind: str) -> Publish
     return next(found, None)
 
 
+def published_number(study: Study, csd: str, quantity: str, kind: str) -> float:
+    """Value of :func:`published_value`, nan where there is none."""
+    found = published_value(study, csd, quantity, kind)
+    return float("nan") if found is None else found.value
+
+
 def table1(study: Study, csds: Csds) -> pd.DataFrame:
     """Tabulate the system dimension L of every distribution (paper, Table 1).
 
@@ -76,7 +81,7 @@ def table1(study: Study, csds: Csds) -> pd.DataFrame:
                 "particles": bed.particles,
                 "initial_void_fraction": study.packing.initial_void_fraction,
                 "system_dimension_um": round(length, 2),
-                "published_um": _value(published),
+                "published_um": published_number(study, name, "system_dimension_um", "simulation"),
                 "published_particles": particles if published else None,
                 "system_dimension_at_published_um": round(same, 2) if published else None,
             }
@@ -102,8 +107,8 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
                 "largest_um": round(truncated.largest / MICROMETRE, 2),
                 "kept_volume_fraction": round(kept, 5),
                 "discarded_volume_fraction": round(max(1.0 - kept, 0.0), 5),
-                "published_smallest_um": _value(published_value(study, name, "smallest_um", "simulation")),
-                "published_largest_um": _value(published_value(study, name, "largest_um", "simulation")),
+                "published_smallest_um": published_number(study, name, "smallest_um", "simulation"),
+                "published_largest_um": published_number(study, name, "largest_um", "simulation"),
             }
         )
     return pd.DataFrame(rows)
@@ -150,10 +155,10 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for name, (full, _) in csds.items():
-        point = _base_point(study, name, summary)
-        if point is None:
+        base = base_rows(study, summary[summary["csd"] == name])
+        if base.empty:
             continue
-        material = study.material
+        point, material = base.iloc[0], study.material
         paper_count = float(point["porosity_paper_count"])
         rows.append(
             {
@@ -162,14 +167,14 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
                 "n": int(point["n"]),
                 "n_failed": int(point["n_failed"]),
                 "engine": point["engine"],
-                "porosity_measured": _value(published_value(study, name, "porosity", "measurement")),
-                "porosity_published": _value(published_value(study, name, "porosity", "simulation")),
+                "porosity_measured": published_number(study, name, "porosity", "measurement"),
+                "porosity_published": published_number(study, name, "porosity", "simulation"),
                 "porosity_paper_count": paper_count,
                 "porosity_paper_count_ci95": point["porosity_paper_count_ci95"],
                 "porosity": point["porosity"],
                 "porosity_ci95": point["porosity_ci95"],
                 **_measured_resistance(published_value(study, name, "resistance_m_kg", "measurement")),
-                "resistance_published_m_kg": _value(published_value(study, name, "resistance_m_kg", "simulation")),
+                "resistance_published_m_kg": published_number(study, name, "resistance_m_kg", "simulation"),
                 "resistance_paper_count_m_kg": (
                     kozeny_carman(paper_count, full, material.density, material.sphericity)
                     if np.isfinite(paper_count)
@@ -183,12 +188,6 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _base_point(study: Study, csd: str, summary: pd.DataFrame) -> pd.Series[Any] | None:
-    """Row of a distribution at the study's base material, None where no sweep visits it."""
-    found = base_rows(study, summary[summary["csd"] == csd])
-    return None if found.empty else found.iloc[0]
-
-
 def _measured_resistance(published: Published | None) -> dict[str, float]:
     """Return a measured resistance, or the range where only that is known."""
     names = ("resistance_measured_m_kg", "resistance_measured_low_m_kg", "resistance_measured_high_m_kg")
@@ -197,10 +196,6 @@ def _measured_resistance(published: Published | None) -> dict[str, float]:
     if published.low is None or published.high is None:
         return dict(zip(names, (published.value, np.nan, np.nan), strict=True))
     return dict(zip(names, (np.nan, published.low, published.high), strict=True))
-
-
-def _value(published: Published | None) -> float:
-    return float("nan") if published is None else published.value
 
 
 def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
