@@ -260,8 +260,7 @@ def filter_area(**options: Any) -> FilterSize:
     ----------
     **options
         The keys of the configuration's ``filter`` block; ``resistance_m_kg``, ``slurry_concentration_kg_m3``; exactly
-        one
-        of ``slurry_flow_m3_h`` and ``filter_area_m2``; ``porosity`` and ``density_kg_m3`` for the cake's thickness.
+        one of ``slurry_flow_m3_h`` and ``filter_area_m2``; ``porosity`` and ``density_kg_m3`` for the cake's thickness.
 
     Raises
     ------

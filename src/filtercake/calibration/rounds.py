@@ -239,8 +239,7 @@ def choose_round(
     """Decide what to pack in a round (numbered from 0), given the points of earlier rounds and what they gave.
 
     The first round is coarse. Later ones refine the cohesion where the interval still is, and, when every candidate
-    there
-    has been packed, add a batch of replicates.
+    there has been packed, add a batch of replicates.
     """
     own = [c for c in candidates if c.point.csd in settings.measured]
     if number == 0 or simulated is None:

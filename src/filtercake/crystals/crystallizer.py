@@ -216,8 +216,8 @@ def crystal_size_distribution(size_scale: float, bin_width: float = BIN_WIDTH) -
     """Cut the product of size scale G tau (m) into size classes of about ``bin_width`` (m; paper section 3.1, Fig 5).
 
     Every class adds to the sums of x/d and x/d^2 what its crystals do, not what as many at its centre would: that would
-    be
-    0.5 % more resistance for the paper's alum. The width used divides the largest size into a whole number of classes.
+    be 0.5 % more resistance for the paper's alum. The width used divides the largest size into a whole number of
+    classes.
 
     Raises
     ------

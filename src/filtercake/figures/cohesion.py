@@ -33,8 +33,7 @@ def draw(
     """Draw a quantity with its 95 % interval, a second estimate, and published values.
 
     ``columns`` are those of the quantity and the half-width of its interval; ``label`` labels a panel's ordinate, given
-    the
-    values it shows.
+    the values it shows.
     """
     cases = selection.varied(data, FREE, "cohesion_kJ_m3")
     count = max(len(cases), 1)

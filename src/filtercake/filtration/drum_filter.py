@@ -232,8 +232,7 @@ def medium_share(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
     """Share of the medium in the overall resistance, ``Rm / (Rm + alpha w / 2)`` (paper, section 4.2).
 
     The cake counts with half its final mass w, its mean while the cake grows at constant pressure. The share is also
-    the
-    area the medium alone would need over the area needed.
+    the area the medium alone would need over the area needed.
     """
     cake = 0.5 * np.asarray(resistance, dtype=np.float64) * cake_mass_per_area(drum, resistance)
     return np.asarray(drum.medium_resistance / (drum.medium_resistance + cake))

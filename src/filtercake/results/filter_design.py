@@ -18,8 +18,7 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
 
     The columns are crystallizer volume, porosity and resistance, those of
     :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 % interval,
-    and
-    the published area.
+    and the published area.
 
     Raises
     ------

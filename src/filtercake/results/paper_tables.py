@@ -118,8 +118,7 @@ def crystallizer_table(study: Study, states: Mapping[str, SteadyState], csds: Cs
     """Tabulate the crystallizer at every residence time, shortest first (paper, Figs 12 and 13).
 
     ``states`` holds the crystallizer behind each of its products. The columns are :data:`CRYSTALLIZER_COLUMNS`; the
-    mean
-    size is weighted by mass.
+    mean size is weighted by mass.
 
     Raises
     ------
