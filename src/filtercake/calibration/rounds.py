@@ -27,7 +27,7 @@ from filtercake.calibration.fit import (
     pooled,
     predict,
 )
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, from_table
+from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, read_tables
 from filtercake.errors import CalibrationError
 from filtercake.filtration.drum_filter import DrumFilter, area
 from filtercake.filtration.resistance import implied_porosity, kozeny_carman
@@ -192,16 +192,11 @@ class Task:
         """Tabulate the packings of the points named (see :func:`simulate`); ``tables`` are the CSD files."""
         wanted = set(names)
         chosen = [c for c in self.candidates if c.point.name in wanted]
-        return simulate(chosen, packings, read_csds(tables), self.settings)
+        return simulate(chosen, packings, read_tables(tables), self.settings)
 
     def full_csds(self, tables: Iterable[str]) -> dict[str, CrystalSizeDistribution]:
         """Read the full distributions from their files, by name."""
-        return {name: full for name, (full, _) in read_csds(tables).items()}
-
-
-def read_csds(tables: Iterable[str]) -> dict[str, FullAndTruncated]:
-    """Read the distributions, full and truncated, from their files, by name."""
-    return {Path(table).stem: from_table(pd.read_csv(table)) for table in tables}
+        return {name: full for name, (full, _) in read_tables(tables).items()}
 
 
 def simulate(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -326,6 +326,17 @@ def from_table(table: pd.DataFrame) -> FullAndTruncated:
     full = replace(full, x_over_d=over_d, x_over_d2=over_d2)
     truncated = CrystalSizeDistribution.from_classes(size, table["truncated_volume_fraction"].to_numpy(np.float64))
     return full, truncated
+
+
+def read_tables(paths: Iterable[str | Path]) -> dict[str, FullAndTruncated]:
+    """Read distributions, named by their files, from what :func:`to_table` tabulated.
+
+    Raises
+    ------
+    CsdError
+        As :func:`from_table`.
+    """
+    return {Path(path).stem: from_table(pd.read_csv(path)) for path in paths}
 
 
 def _check_classes(sizes: FloatArray, fractions: FloatArray) -> None:

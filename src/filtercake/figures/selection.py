@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.crystals.crystallizer import SteadyState
-from filtercake.crystals.csd import FullAndTruncated, from_table
+from filtercake.crystals.csd import FullAndTruncated, read_tables
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
 from filtercake.study.config.published import Published
@@ -67,7 +67,7 @@ class StudyData:
             points=pd.read_csv(folder / "points.csv"),
             summary=pd.read_csv(folder / "summary.csv"),
             replicates=pd.read_csv(folder / "replicates.csv"),
-            csds={Path(table).stem: from_table(pd.read_csv(table)) for table in csds},
+            csds=read_tables(csds),
             packings=folder / "packings",
             crystallizer=next(map(pd.read_csv, crystallizer), pd.DataFrame()),
         )
