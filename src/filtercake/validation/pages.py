@@ -11,7 +11,7 @@ import pandas as pd
 from filtercake.study import limits
 from filtercake.user_files import templates
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
-from filtercake.validation.stability import OUTCOMES, families, undetected, wrong
+from filtercake.validation.stability import COVERAGE, OUTCOMES, families, undetected, wrong
 
 INTERIOR, COUNT = "interior slab", "count"
 PAPER = "as published"
