@@ -130,7 +130,7 @@ rule calibration_figure:
         summary="{results}/{calibration}/calibration.json",
         tables=expand("{{results}}/{{calibration}}/tables/{table}.csv", table=TABLES),
         predictions=prediction_tables,
-        library=lambda wildcards: library(calibrated.module_of(wildcards.figure)),
+        library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
     output:
         png=report(
             "{results}/{calibration}/figures/{figure}.png",
@@ -145,7 +145,7 @@ rule calibration_figure:
     benchmark:
         "{results}/{calibration}/benchmarks/figures/{figure}.tsv"
     wildcard_constraints:
-        figure="|".join(calibrated.CALIBRATION_FIGURES),
+        figure="|".join(catalogue.CALIBRATION_FIGURES),
     group:
         "figures"
     conda:

@@ -8,7 +8,7 @@ from filtercake.calibration.config import (
     load_calibrations,
     settings_of,
 )
-from filtercake.figures import calibrated, catalogue
+from filtercake.figures import catalogue
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
 from filtercake.packing.result import read_record

@@ -96,7 +96,7 @@ def prediction_tables(wildcards):
 
 def outputs_of_calibration(name):
     calibration, folder = CALIBRATED[name], f"{RESULTS}/{name}"
-    figures = calibrated.figures_of(
+    figures = catalogue.figures_of_calibration(
         bool(calibration.model.predict), calibration.measurements
     )
     found = [f"{folder}/calibration.json", f"{folder}/tables/fits.csv"]

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from filtercake.figures.catalogue import save
-from filtercake.figures.style import applied
+from filtercake.figures.style import applied, save
 from filtercake.packing.result import publish
 from filtercake.run.job import Progress, job
 from filtercake.study import engine_choice

@@ -42,7 +42,7 @@ class Exported:
     Attributes
     ----------
     folder : Path
-        Where it is.
+        Folder of the export.
     point : str
         Name of the point.
     replicate : int
@@ -71,7 +71,7 @@ def export(study: str, point: str, results: str | Path, output: str | Path, repl
     output : str or Path
         The folder, which must not exist.
     replicate : int, optional
-        Which packing; the first that failed, or 0, if left out.
+        Number of the packing; the first that failed, or 0, if left out.
 
     Raises
     ------
@@ -98,11 +98,6 @@ def export(study: str, point: str, results: str | Path, output: str | Path, repl
 
 def rerun(folder: str | Path) -> PackingPorosity:
     """Make an exported packing once more, in the folder ``rerun`` of the export.
-
-    Parameters
-    ----------
-    folder : str or Path
-        What :func:`export` wrote.
 
     Raises
     ------

@@ -12,14 +12,12 @@ from typing import Any
 import pandas as pd
 
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
-from filtercake.crystals.csd import FullAndTruncated
 from filtercake.errors import ConfigError, Problem
 from filtercake.packing.engines.liggghts import template_folder
-from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates
+from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates
 from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.result import Packing as SettledPacking
 from filtercake.packing.result import write_json
-from filtercake.results.replicates import REPLICATE_COLUMNS, failed_row, replicate_row, summarise
+from filtercake.results.replicates import REPLICATE_COLUMNS, replicate_rows, summarise
 from filtercake.run.provenance import code_hash, packing_sources, versions
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
@@ -29,8 +27,6 @@ from filtercake.units import MICROSECOND
 SUMMARY = "summary.json"
 _OWN = re.compile(rf"r\d+\..*|\.r\d+\..*|\.work|{re.escape(MANIFEST)}|{re.escape(SUMMARY)}")
 """Names that packings and their records have."""
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -47,9 +43,9 @@ class Bed:
     files : tuple of Path
         The accepted packings.
     failures : tuple of str
-        Why others were not.
+        Reasons of the failed packings.
     warnings : tuple of str
-        What is allowed but doubtful about the arguments.
+        Doubts about allowed arguments.
     """
 
     summary: dict[str, Any]
@@ -59,7 +55,7 @@ class Bed:
     warnings: tuple[str, ...]
 
 
-def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None, **options: Any) -> Bed:
+def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: None, **options: Any) -> Bed:
     """Pack spheres of a size distribution, and measure porosity and resistance.
 
     Packings that ``folder`` holds of the same arguments are kept, so that more of them, or a narrower interval, may be
@@ -72,7 +68,7 @@ def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None,
     folder : str or Path
         Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
     say : callable
-        Takes a line about each packing as it comes.
+        Receives a line per packing.
     **options
         The keys of the configuration's blocks ``material`` and ``packing``.
 
@@ -94,7 +90,7 @@ def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None,
     resistance(source, porosity=0.01, density_kg_m3=point.scene.density, sphericity=study.model.material.sphericity)
     outcomes = _make(point, path, say)
     sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
-    rows = [_row(point, outcome, path, sizes, sphericity) for outcome in outcomes]
+    rows = list(replicate_rows(point, outcomes, path, sizes, sphericity))
     table = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
     summary = _summary(table, point)
     write_json(path / SUMMARY, {**summary, "versions": versions()})
@@ -112,7 +108,7 @@ def code_of(engine: str) -> str:
     return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
 
 
-def _make(point: Point, folder: Path, say: Say) -> list[Outcome]:
+def _make(point: Point, folder: Path, say: Report) -> list[Outcome]:
     def report(outcome: Outcome, record: dict[str, Any]) -> None:
         if outcome.status == "ok":
             say(f"r{outcome.replicate}: {record['steps']:,} steps, {record['wall_s']:.1f} s")
@@ -124,12 +120,6 @@ def _make(point: Point, folder: Path, say: Say) -> list[Outcome]:
     if interval is not None:
         enough = UntilNarrow(point.scene, interval, point.replicates)
     return pack_replicates(point.scene, point.most_replicates, folder, code, report, say, enough)
-
-
-def _row(point: Point, outcome: Outcome, folder: Path, sizes: FullAndTruncated, sphericity: float) -> dict[str, Any]:
-    if outcome.status != "ok":
-        return failed_row(point, outcome, outcome.reason)
-    return replicate_row(point, SettledPacking.load(folder / f"r{outcome.replicate}.npz"), sizes, sphericity)
 
 
 def _summary(table: pd.DataFrame, point: Point) -> dict[str, Any]:

@@ -55,17 +55,10 @@ EXAMPLES = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command.
+    """Run a command, by default with the arguments of the process.
 
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        The arguments; those of the process if left out.
-
-    Returns
-    -------
-    int
-        Exit status: 0 where all went well, 1 where no packing was accepted, 2 where the command or its input is wrong.
+    The exit status is 0 where all went well, 1 where no packing was accepted, 2 where the command or its input is
+    wrong.
     """
     parser = build_parser()
     options = argparse.Namespace()

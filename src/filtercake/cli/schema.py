@@ -161,7 +161,7 @@ def _widen(node: Any) -> Any:
 
 
 def meaning(field: FieldInfo) -> str:
-    """Say what a field is, in the words of the model."""
+    """Return the description of a field in the model."""
     return (field.description or "").strip()
 
 
@@ -193,7 +193,7 @@ def _example(key: str) -> str:
 
 
 def allowed(field: FieldInfo) -> str:
-    """Say what values a field takes, from its annotation and bounds."""
+    """Return the allowed values of a field, from its annotation and bounds."""
     metadata = [*field.metadata, *_inner_metadata(field.annotation)]
     for item in metadata:
         if isinstance(item, WithJsonSchema) and item.json_schema:

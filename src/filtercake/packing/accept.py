@@ -47,13 +47,13 @@ def accept(state: SettledState, scene: Scene, cloud: Cloud, rule: StopRule) -> d
     Parameters
     ----------
     state : SettledState
-        What the engine returned.
+        Result of the engine.
     scene : Scene
         What was asked for.
     cloud : Cloud
         The initial cloud.
     rule : StopRule
-        When a bed counts as settled.
+        Stop rule.
 
     Raises
     ------

@@ -95,7 +95,7 @@ def box_length(
 
 @dataclass(frozen=True)
 class BedSize:
-    """How large a bed of a distribution has to be."""
+    """Number of spheres and relative depth of a bed."""
 
     particles: int
     bed_depth_factor: float
@@ -169,10 +169,15 @@ def make_cloud(
     return Cloud(position * length, radius, length, height)
 
 
+def size_levels(radius: FloatArray) -> IntArray:
+    """Size level of each sphere, shape (n,): its radius is 1 to 1/2, 1/2 to 1/4, ... of the largest."""
+    return np.asarray(np.floor(np.log2(radius.max() / radius) + 1e-12).astype(np.int64))
+
+
 def _grid_levels(radius: FloatArray, length: float, height: float) -> tuple[IntArray, IntArray]:
     """Size level of each sphere (factor 2 apart) and each level's grid shape (levels, 3)."""
     largest = radius[0]
-    level = np.floor(np.log2(largest / radius) + 1e-12).astype(np.int64)
+    level = size_levels(radius)
     cells = np.empty((int(level.max()) + 1, 3), dtype=np.int64)
     for k in range(cells.shape[0]):
         cell = 2.0 * largest / 2.0**k

@@ -23,11 +23,12 @@ WORK = ".work"
 """Scratch folder of a point's packings."""
 
 Report = Callable[[str], None]
+"""Receives a line of progress."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one replicate.
+    """Outcome of one replicate.
 
     Attributes
     ----------
@@ -36,13 +37,13 @@ class Outcome:
     status : {"ok", "failed"}
         Whether there is an accepted packing.
     reason : str
-        Why not; empty where there is one.
+        Reason of the failure; empty for an accepted packing.
     seed : int
         Seed of the initial cloud.
     sha256 : str
         Checksum of the geometry file; empty where there is none.
     attempts : int
-        How often it was tried.
+        Number of attempts.
     may_pass : bool
         Whether it failed for a reason outside the packing (program killed or missing, disk full, time limit), so that
         another run may make it.
@@ -86,12 +87,10 @@ def pack(
         Number of the replicate; decides the seed.
     folder : Path
         Empty scratch folder for the engine's files.
-    engine : Engine, optional
-        Used instead of the one that the scene names.
-    progress : callable
-        Takes a line about a long packing.
+    engine, progress : Engine, callable, optional
+        Used instead of the engine that the scene names; receives a line about a long packing.
     state_file : Path, optional
-        Where a long packing keeps its state, to go on from there when it was stopped.
+        Keeps the state of a long packing, which goes on from there when it was stopped.
 
     Raises
     ------
@@ -112,16 +111,16 @@ def pack(
 
 @dataclass(frozen=True)
 class Settled:
-    """What an engine made of a cloud, accepted or not.
+    """Result of an engine with what it started from, accepted or not.
 
     Attributes
     ----------
     state : SettledState
         The engine's result.
     cloud : Cloud
-        What it started from.
+        Initial cloud.
     rule : StopRule
-        When the bed was to stop.
+        Stop rule.
     seed : int
         Seed of the cloud.
     """
@@ -164,25 +163,21 @@ def pack_replicates(
     progress: Report = lambda _: None,
     enough: Callable[[Path], bool] = lambda _: False,
 ) -> list[Outcome]:
-    """Make a point's replicates in ``folder`` and write their manifest last.
+    """Make the replicates of a point in ``folder`` and write their manifest last.
 
-    Finished replicates are kept when the same point is run again, unless what decides the packing or the
-    code changed; a packing that fails is an outcome with a reason, not an error.
+    Finished replicates are kept when the same point is run again, unless what decides the packing or the code (whose
+    hash is ``code``) changed; a packing that fails is an outcome with a reason, not an error.
 
     Parameters
     ----------
-    scene : Scene
+    scene, progress
         As for :func:`pack`.
     replicates : int
-        How many, at most.
+        Largest number of packings.
     folder : Path
         Receives r<k>.npz, r<k>.json and the manifest.
-    code : str
-        Hash of the code and decks behind the packing.
     report : callable
-        Called with every outcome and its record as it comes.
-    progress : callable
-        Takes a line about a long packing.
+        Receives every outcome and its record.
     enough : callable
         Called with the geometry file of every accepted packing; says whether no further one is needed.
 

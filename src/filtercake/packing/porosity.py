@@ -41,12 +41,7 @@ class PorosityResult:
 def volume_below(height: float | FloatArray, centre: FloatArray, radius: FloatArray) -> FloatArray:
     """Volume of spheres below a horizontal plane, m3, in closed form (spherical cap).
 
-    Parameters
-    ----------
-    height : float or ndarray
-        Height of the plane, m; broadcasts against ``centre``.
-    centre, radius : ndarray
-        Heights of the centres and radii, m, of broadcastable shapes.
+    The heights of plane and centres and the radii, all in m, broadcast against each other.
     """
     depth = np.clip(height - centre + radius, 0.0, 2.0 * radius)
     return np.asarray(np.pi / 3.0 * depth**2 * (3.0 * radius - depth))
@@ -55,25 +50,13 @@ def volume_below(height: float | FloatArray, centre: FloatArray, radius: FloatAr
 def slab_porosity(position: FloatArray, radius: FloatArray, length: float, slab: Slab) -> float:
     """Exact porosity between two heights: spheres clipped by the slab's faces in closed form.
 
-    Parameters
-    ----------
-    position : ndarray, shape (n, 3)
-        Centres, m.
-    radius : ndarray, shape (n,)
-        Radii, m.
-    length : float
-        Side of the periodic box, m.
-    slab : Slab
-        Lower and upper height, m.
+    Positions (n, 3), radii (n,) and the side of the periodic box in m. Overlaps count twice, as in every published
+    porosity of such beds; :func:`filtercake.packing.contact_law.soft_contact_compaction` says how much that is.
 
     Raises
     ------
     ValueError
         If the slab has no thickness.
-
-    Notes
-    -----
-    Overlaps count twice, as in every published porosity of such beds; :func:`compaction` says how much that is.
     """
     if slab.thickness <= 0.0:
         raise ValueError(f"the slab {slab.lower:g}..{slab.upper:g} m has no thickness")
@@ -95,23 +78,9 @@ def paper_count_porosity(
 
 
 def porosity_profile(position: FloatArray, radius: FloatArray, length: float, edges: FloatArray) -> FloatArray:
-    """Exact porosity of each slice between consecutive heights.
+    """Exact porosity of each slice between consecutive heights ``edges`` (m + 1,), shape (m,).
 
-    Parameters
-    ----------
-    position : ndarray, shape (n, 3)
-        Centres, m.
-    radius : ndarray, shape (n,)
-        Radii, m.
-    length : float
-        Side of the periodic box, m.
-    edges : ndarray, shape (m + 1,)
-        Ascending heights, m.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Porosities.
+    Positions (n, 3), radii (n,), the side of the periodic box and the ascending edges in m.
     """
     below = np.array([volume_below(edge, position[:, 2], radius).sum() for edge in edges])
     return np.asarray(1.0 - np.diff(below) / (length**2 * np.diff(edges)))

@@ -45,17 +45,7 @@ class UntilNarrow:
     """
 
     def __init__(self, scene: Scene, interval: float, least: int = LEAST_REPLICATES):
-        """Ask for an interval.
-
-        Parameters
-        ----------
-        scene : Scene
-            What is packed.
-        interval : float
-            Half-width asked for of the 95 % interval of the mean interior porosity.
-        least : int
-            Packings to make in any case.
-        """
+        """Ask for a half-width of the 95 % interval of the mean interior porosity, with at least so many packings."""
         self.scene, self.interval, self.least = scene, interval, max(least, LEAST_REPLICATES)
         self.values: list[float] = []
         self.narrow = 0

@@ -1,4 +1,4 @@
-"""Where results come from: the library files behind a module, and the versions behind a run."""
+"""Provenance of results: the library files behind a module, and the versions behind a run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,9 @@ PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "scikit-learn", "
 
 @cache
 def sources(module: str) -> tuple[Path, ...]:
-    """List the library's own files that a module depends on, itself included, sorted.
+    """List the library's own files that a module (``packing.pack``) depends on, itself included, sorted.
 
     Snakemake does not see imports: rules name these files as inputs, so that an edit reruns what depends on it.
-
-    Parameters
-    ----------
-    module : str
-        Dotted name below ``filtercake``, e.g. ``packing.pack``.
 
     Raises
     ------

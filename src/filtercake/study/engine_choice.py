@@ -1,4 +1,4 @@
-"""Which engine a study uses on this machine."""
+"""Choice of the engine for ``engine: auto`` on this machine."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""Read configuration files and say everything that is wrong with them at once: file, key, value, what is allowed."""
+"""Read and check configuration files; every problem is reported at once, with file, key, value and allowed values."""
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
 from collections.abc import Iterable
@@ -14,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
-from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, shown
+from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
 from filtercake.packing.cloud import bed_for
 from filtercake.packing.scene import Scene
 from filtercake.study import limits
@@ -45,7 +44,7 @@ OWN_NAMES = ("benchmark", "benchmark_quick", "benchmark_redrawn", "benchmarks", 
 """Folders of the results that are the workflow's own: no study can have such a name."""
 
 OWN_PREFIXES = ("agreement_", "calibration_")
-"""How the names begin of the studies that the workflow makes itself."""
+"""First parts of the names of studies that the workflow makes itself."""
 
 _OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
 
@@ -90,7 +89,7 @@ class LoadedStudy:
     csds : dict of str to LoadedCsd
         Its distributions.
     warnings : tuple of str
-        What is allowed but doubtful.
+        Doubts about allowed values.
     """
 
     name: str
@@ -132,7 +131,7 @@ def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
             problems.append(Problem(file, key, repr(study), "a study's file name must be letters, digits, - and _"))
         elif not is_file(path):
             allowed = f"no such study; allowed: {', '.join(known)}, or the path of a study file"
-            problems.append(Problem(file, key, repr(study), allowed + _did_you_mean(study, known)))
+            problems.append(Problem(file, key, repr(study), allowed + did_you_mean(study, known)))
         elif path.stem in [other.stem for other in paths]:
             problems.append(Problem(file, key, repr(study), "two studies of the same name; rename one file"))
         elif _is_own(path, folder.parent / "benchmarks"):
@@ -163,14 +162,7 @@ def load_study(path: Path) -> LoadedStudy:
 
 
 def check_study(values: Any, path: Path) -> LoadedStudy:
-    """Check a study's values, however they were given.
-
-    Parameters
-    ----------
-    values : Any
-        What the study's file holds.
-    path : Path
-        Its file, for messages and for the files it names.
+    """Check a study's values, however they were given; the path is for messages and for the files they name.
 
     Raises
     ------
@@ -217,16 +209,7 @@ def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
 
 
 def parse(model: type[M], values: Any, file: str) -> M:
-    """Check the values of a YAML file against its model.
-
-    Parameters
-    ----------
-    model : type of BaseModel
-        What the file must be.
-    values : Any
-        What :func:`~filtercake.user_files.read_yaml` returned.
-    file : str
-        Its name, for messages.
+    """Check what :func:`~filtercake.user_files.read_yaml` returned for a file against the model of that file.
 
     Raises
     ------
@@ -250,7 +233,7 @@ def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
     if item["type"] == "extra_forbidden":
         allowed = _allowed_keys(model, location[:-1])
         new = next((name for name in RENAMED.get(str(location[-1]), ()) if name in allowed), None)
-        message = f"unknown key; allowed here: {', '.join(allowed)}{_did_you_mean(str(location[-1]), allowed)}"
+        message = f"unknown key; allowed here: {', '.join(allowed)}{did_you_mean(str(location[-1]), allowed)}"
         if new is not None:
             message = f"is now called {new}"
     elif item["type"] == "missing":
@@ -287,11 +270,6 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
-
-
-def _did_you_mean(word: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"; did you mean {close[0]}?" if close else ""
 
 
 def _source_of(name: str, csd: Csd) -> tuple[str, str]:
@@ -353,7 +331,7 @@ def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
     named += [(f"published[{i}].csd", entry.csd) for i, entry in enumerate(model.published)]
     for key, name in named:
         if name not in model.csds:
-            allowed = f"not in csds; allowed: {', '.join(known)}{_did_you_mean(name, known)}"
+            allowed = f"not in csds; allowed: {', '.join(known)}{did_you_mean(name, known)}"
             yield Problem(file, key, repr(name), allowed)
 
 

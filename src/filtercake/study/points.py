@@ -97,12 +97,7 @@ def with_engine(study: LoadedStudy, engine: str) -> LoadedStudy:
 def expand(study: LoadedStudy, choose_engine: ChooseEngine) -> list[Point]:
     """List a study's points: the union of its sweeps; a point in two sweeps is visited once.
 
-    Parameters
-    ----------
-    study : LoadedStudy
-        The checked study.
-    choose_engine : callable
-        Names the engine for ``engine: auto``.
+    ``choose_engine`` names the engine for ``engine: auto``.
     """
     points: dict[str, Point] = {}
     for sweep in study.model.sweeps:
@@ -134,17 +129,7 @@ def points_table(points: Iterable[Point]) -> pd.DataFrame:
 
 
 def base_rows(study: Study, table: pd.DataFrame, free: Collection[str] = ()) -> pd.DataFrame:
-    """Rows of a table of points at the study's base material.
-
-    Parameters
-    ----------
-    study : Study
-        Its material is the base.
-    table : DataFrame
-        Has the columns ``SWEPT``.
-    free : collection of str
-        Properties of ``SWEPT`` that may have any value.
-    """
+    """Rows of a table of points at the study's base material, but for the properties named by ``free``."""
     keep = np.ones(len(table), dtype=bool)
     for name in SWEPT:
         if name not in free:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
+from filtercake.packing.pack import Report
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.scene import Scene
 from filtercake.study import limits
@@ -78,8 +79,6 @@ REFERENCE_COLUMNS = (
     "wall_s",
 )
 """Columns of ``replicates.csv`` that are kept of the reference ensembles."""
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing.engines.embedded import Embedded
-from filtercake.packing.pack import settle
+from filtercake.packing.pack import Report, settle
 from filtercake.packing.result import SettledState
 from filtercake.packing.scene import Scene
 from filtercake.validation.timing import Contender, warm_up
@@ -22,8 +22,6 @@ SMALLEST = 20e-6
 CLASSES = 10
 """Size classes, evenly spaced in log size, each with the same volume."""
 
-Report = Callable[[str], None]
-
 
 @dataclass(frozen=True)
 class Case:
@@ -32,7 +30,7 @@ class Case:
     Attributes
     ----------
     series : {"particles", "size_ratio"}
-        What grows.
+        Quantity that is varied.
     particles : int
         Number of spheres.
     size_ratio : float
@@ -63,9 +61,9 @@ def time_growth(base: Scene, cases: Iterable[Case], report: Report = lambda _: N
     base : Scene
         Material and protocol; the number of spheres and the time step follow the case.
     cases : iterable of Case
-        What is timed, in this order.
+        Beds that are timed, in this order.
     report : callable
-        Takes a line per case.
+        Receives a line per case.
 
     Returns
     -------

@@ -27,7 +27,7 @@ from filtercake.packing.engines import Engine, get_engine
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.packing.engines.micro import SI
-from filtercake.packing.pack import settle
+from filtercake.packing.pack import Report, settle
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, SettledState
 from filtercake.packing.scene import Scene
@@ -76,8 +76,6 @@ COLUMNS = (
     "seconds",
     "reason",
 )
-
-Report = Callable[[str], None]
 
 
 BASE = {
@@ -435,10 +433,14 @@ def with_fence(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(fence=[limits.verdict(scene_of(known[key].numbers, known[key].engine)) for key in keys])
 
 
+def wrong(table: pd.DataFrame) -> pd.Series[bool]:
+    """Whether the mean porosity of a row's accepted packings is off by more than ``WRONG`` beyond doubt."""
+    return (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
+
+
 def undetected(table: pd.DataFrame) -> pd.DataFrame:
     """Rows whose accepted packings are wrong, though the configuration would let them pass without a word."""
-    wrong = (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
-    return table[wrong & (table["fence"] == "allowed")]
+    return table[wrong(table) & (table["fence"] == "allowed")]
 
 
 def _standard_error(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:

@@ -6,7 +6,7 @@ import math
 import resource
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
 from filtercake.packing.engines import Engine, get_engine
-from filtercake.packing.pack import settle
+from filtercake.packing.pack import Report, settle
 from filtercake.packing.porosity import measure
 from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
@@ -30,8 +30,6 @@ MEGABYTE = 1024.0
 """Kibibytes in the unit of the table's memory."""
 
 POROSITIES = ("porosity", "porosity_from_floor", "porosity_paper_count")
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)

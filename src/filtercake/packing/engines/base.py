@@ -1,4 +1,4 @@
-"""What every packing engine offers and what it is asked."""
+"""Interface of the packing engines."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class SettleRequest:
     cloud : Cloud
         The initial cloud.
     rule : StopRule
-        When the bed is at rest.
+        Stop rule.
     seed : int
-        For whatever the engine draws itself.
+        Seed of the random numbers that the engine draws itself.
     folder : Path
         Private scratch folder, empty.
     progress : callable
-        Called now and then with a line about a long packing.
+        Receives a line of progress now and then.
     state_file : Path or None
         Where an engine that can go on from a saved state keeps one; it outlives the folder.
     """

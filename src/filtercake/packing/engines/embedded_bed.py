@@ -14,7 +14,7 @@ import numpy as np
 
 from filtercake.errors import EngineError
 from filtercake.packing import contact_law
-from filtercake.packing.cloud import Cloud
+from filtercake.packing.cloud import Cloud, size_levels
 from filtercake.packing.engines import embedded_kernels as kernels
 from filtercake.packing.scene import Scene
 from filtercake.units import GRAVITY, FloatArray, IntArray
@@ -97,7 +97,7 @@ class Bed:
         self.touched = np.ones(n, dtype=np.bool_)
         self.identity = np.arange(n)
         self.floor_spring = np.zeros((n, 2))
-        self.level = np.floor(np.log2(radius.max() / radius) + 1e-12).astype(np.int64)
+        self.level = size_levels(radius)
         self.largest = np.array(
             [radius[self.level == k].max(initial=0.0) for k in range(int(self.level.max()) + 1)], dtype=np.float64
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from filtercake.packing.result import SettledState
 from filtercake.packing.scene import Scene
 from filtercake.packing.settling import WINDOW, Trajectory
 from filtercake.units import GRAVITY, FloatArray
+from filtercake.user_files import templates
 
 EXECUTABLE_VARIABLE = "FILTERCAKE_LIGGGHTS"
 EXECUTABLES = ("liggghts", "lmp_auto", "lmp_liggghts")
@@ -181,17 +181,6 @@ class _Watcher:
             return parse_log(stream.read().decode("utf-8", "replace"))
 
 
-@cache
-def _environment(folder: str) -> jinja2.Environment:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
 def render(template: str, values: dict[str, Any]) -> str:
     """Fill a deck template.
 
@@ -202,7 +191,7 @@ def render(template: str, values: dict[str, Any]) -> str:
     """
     folder = template_folder()
     try:
-        return _environment(str(folder)).get_template(template).render(values)
+        return templates(folder).get_template(template).render(values)
     except jinja2.TemplateNotFound:
         raise EngineError(f"deck template {folder / template} does not exist") from None
     except jinja2.TemplateError as error:

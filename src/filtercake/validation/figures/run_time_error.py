@@ -22,7 +22,7 @@ CASES = {
     "alum_wide": "Alum 15 min, N = 20 000",
 }
 AXES = ("time step", "spheres", "stop tolerance", "skin", "engine", "softer contacts", "truncation")
-"""What a variant differs in, in the order of colours."""
+"""Properties in which variants differ, in the order of colours."""
 AS_PUBLISHED = "as published"
 INTERIOR, COUNT = "interior slab", "count"
 REPLICATES = (1, 2, 4, 8, 16, 32)
@@ -36,14 +36,9 @@ STAR: dict[str, Any] = {
 
 
 def draw(table: pd.DataFrame, references: pd.DataFrame) -> Figure:
-    """Draw one panel per case.
+    """Draw one panel per case, from all cases of :func:`filtercake.validation.error_against_time.errors`.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Of :func:`filtercake.validation.error_against_time.errors`, all cases.
-    references : DataFrame
-        Columns case, porosity, standard_error.
+    ``references`` has the columns case, porosity and standard_error.
     """
     cases = [case for case in CASES if case in set(table["case"])]
     figure, panels = style.panels(len(cases), width=style.DOUBLE, height=2.9 * -(-len(cases) // 2), columns=2)

@@ -34,13 +34,7 @@ NAMES = {
 
 
 def draw(table: pd.DataFrame) -> Figure:
-    """Draw one map per family and engine; cases are evenly spaced, whatever their values.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Of :func:`filtercake.validation.stability.run`, all families.
-    """
+    """Draw one map per family and engine; cases are evenly spaced, whatever their values."""
     maps = list(table[["family", "engine"]].drop_duplicates().itertuples(index=False, name=None))
     figure, panels = style.panels(len(maps), width=style.DOUBLE, height=1.9 * -(-len(maps) // 3) + 0.5, columns=3)
     for axes, (family, engine) in zip(panels, maps, strict=True):
