@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import gammainc
 
 from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
 from filtercake.errors import ConfigError, CrystallizerError, Problem, shown
@@ -252,7 +252,7 @@ def cumulative_volume(size_scale: float, size: ArrayLike) -> FloatArray:
     CrystallizerError
         If the size scale is not positive and finite, or a size is negative or not finite.
     """
-    return np.asarray(gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
+    return np.asarray(scipy.special.gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
 
 
 def sum_x_over_d2(size_scale: float) -> float:
@@ -289,7 +289,8 @@ def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, Flo
     """
     a = _checked("size_scale", size_scale, _positive)
     scaled = _sizes(size) / a
-    return np.asarray(gammainc(3.0, scaled) / (3.0 * a)), np.asarray(gammainc(2.0, scaled) / (6.0 * a**2))
+    first, second = (scipy.special.gammainc(order, scaled) for order in (3.0, 2.0))
+    return np.asarray(first / (3.0 * a)), np.asarray(second / (6.0 * a**2))
 
 
 def crystal_size_distribution(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from filtercake.units import FloatArray, IntArray
 
@@ -47,7 +47,7 @@ def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Co
     box = np.array([length, length, 0.0])
     level = np.floor(np.log2(radius.max() / radius)).astype(np.int64)
     members = [np.flatnonzero(level == k) for k in np.unique(level)]
-    trees = [cKDTree(wrapped[m], boxsize=box) for m in members]
+    trees = [scipy.spatial.cKDTree(wrapped[m], boxsize=box) for m in members]
     first, second, depth = [], [], []
     for a, coarse in enumerate(members):
         for b in range(a, len(members)):
