@@ -1,13 +1,9 @@
 # Loads and checks the configuration, and offers the helpers that the rules share. Stops here, before any job,
 # with every problem of every file when something is wrong.
 import os
+import re
 import time
 
-from filtercake.calibration.config import (
-    candidates as calibration_candidates,
-    load_calibrations,
-    settings_of,
-)
 from filtercake.figures import catalogue
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST
@@ -17,9 +13,8 @@ from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.run.provenance import packing_sources, sources
 from filtercake.study import engine_choice, estimate
 from filtercake.study.loading import find_studies, load_studies
-from filtercake.study.points import expand as expand_points, with_engine
+from filtercake.study.points import expand as expand_points
 from filtercake.units import MICROMETRE
-from filtercake.validation.stability import families as stress_families
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
@@ -28,6 +23,9 @@ for handler in logger.handlers:
         handler.addFilter(console.worth_reading)
 
 ROOT = Path(workflow.basedir)
+VALIDATION = ROOT / "workflow" / "rules" / "validation.smk"
+# studies whose names do not hold that of a rule of validation
+BED_SIZES = ["alum", "alum_full"]
 
 
 def points_by_name(studies):
@@ -48,12 +46,17 @@ try:
         )
     }
     POINTS = points_by_name(STUDIES)
-    CALIBRATIONS = load_calibrations(
-        settings.calibrations,
-        ROOT / "config" / "calibrations",
-        ROOT / "config" / "studies",
-        CONFIG_FILE,
-    )
+    CALIBRATIONS = []
+    if settings.calibrations:
+        # imports the solvers, which studies need not wait for
+        from filtercake.calibration.config import load_calibrations
+
+        CALIBRATIONS = load_calibrations(
+            settings.calibrations,
+            ROOT / "config" / "calibrations",
+            ROOT / "config" / "studies",
+            CONFIG_FILE,
+        )
     engine_choice.check([*STUDIES.values(), *(item.study for item in CALIBRATIONS)])
 except FiltercakeError as error:
     stop(error)
@@ -216,6 +219,25 @@ def begin_run():
         print(console.plan(points_of_run(), packings), file=sys.stderr)
     if to_make:
         print(cost_of(to_make).words(cores_of_run()), file=sys.stderr)
+
+
+def validation_is_asked():
+    """Whether the command line names a rule of validation, one of its files or one of its studies; in doubt, yes.
+
+    Snakemake gives a workflow its targets only once all rules are read, so the words it was started with are
+    searched; it starts itself for single jobs, here or on a cluster, with their rules and wildcards in plain words.
+    """
+    program, *words = sys.argv
+    started_by = [part.removesuffix(".py") for part in Path(program).parts]
+    if started_by[-1] != "snakemake" and started_by[-2:] != ["snakemake", "__main__"]:
+        return True
+    if any(word.startswith(("--li", "--lt", "-l")) for word in words):
+        return True  # lists or checks every rule
+    names = re.findall(r"^rule\s(\w+)", VALIDATION.read_text(), re.MULTILINE)
+    names += [name for name in BED_SIZES if name not in STUDIES]
+    keys = tuple(f"{key}=" for key in type(settings).model_fields)
+    targets = [word for word in words if not word.startswith(keys)]
+    return any(name in target for target in targets for name in names)
 
 
 def bed_size_tables(wildcards):

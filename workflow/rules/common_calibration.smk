@@ -1,4 +1,10 @@
 # What the rules of calibrations share: points, and which of them the rounds so far ask for.
+if CALIBRATIONS:
+    from filtercake.calibration.config import (
+        candidates as calibration_candidates,
+        settings_of,
+    )
+
 CALIBRATED = {calibration.name: calibration for calibration in CALIBRATIONS}
 CANDIDATES = {
     name: {

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import gammainc
 
 from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
 from filtercake.errors import ConfigError, CrystallizerError, Problem, did_you_mean, shown
@@ -197,7 +197,7 @@ def cumulative_volume(size_scale: float, size: ArrayLike) -> FloatArray:
     Size scale G tau and sizes L in m; a size scale that is not positive and finite, or a size that is negative or not
     finite, raises a CrystallizerError.
     """
-    return np.asarray(gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
+    return np.asarray(scipy.special.gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
 
 
 def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -209,7 +209,8 @@ def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, Flo
     """
     a = _checked("size_scale", size_scale, _positive)
     scaled = _sizes(size) / a
-    return np.asarray(gammainc(3.0, scaled) / (3.0 * a)), np.asarray(gammainc(2.0, scaled) / (6.0 * a**2))
+    first, second = (scipy.special.gammainc(order, scaled) for order in (3.0, 2.0))
+    return np.asarray(first / (3.0 * a)), np.asarray(second / (6.0 * a**2))
 
 
 def crystal_size_distribution(size_scale: float, bin_width: float = BIN_WIDTH) -> CrystalSizeDistribution:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from filtercake.packing.cloud import size_levels
 from filtercake.units import FloatArray, IntArray
@@ -40,7 +40,7 @@ def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Co
     box = np.array([length, length, 0.0])
     level = size_levels(radius)
     members = [np.flatnonzero(level == k) for k in np.unique(level)]
-    trees = [cKDTree(wrapped[m], boxsize=box) for m in members]
+    trees = [scipy.spatial.cKDTree(wrapped[m], boxsize=box) for m in members]
     first, second, depth = [], [], []
     for a, coarse in enumerate(members):
         for b in range(a, len(members)):

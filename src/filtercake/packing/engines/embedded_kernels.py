@@ -682,7 +682,8 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
-    The kind is all that is bound here: numba finds a function that binds compiled ones in no cache. A threaded loop gives each thread a share of the pairs and a force buffer of its own.
+    The kind is all that is bound here: numba finds a function that binds compiled ones in no cache. A threaded loop
+    gives each thread a share of the pairs and a force buffer of its own.
     """
 
     @njit(cache=True, error_model="numpy", fastmath=FUSED, parallel=threaded)
