@@ -13,7 +13,6 @@ from pydantic import Field, model_validator
 
 from filtercake.calibration.fit import ADVISED_FRICTIONS, Finding, Observation, Parameter, advised_friction
 from filtercake.calibration.measurements import (
-    NORMAL95,
     Measurement,
     Measurements,
     compressibility_by_csd,
@@ -26,6 +25,7 @@ from filtercake.errors import ConfigError, Problem, shown
 from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.filtration.resistance import implied_porosity
 from filtercake.packing import contact_law
+from filtercake.statistics import quantile
 from filtercake.study.config.packing import EngineName
 from filtercake.study.config.study import MOST_DISTRIBUTIONS, Workflow
 from filtercake.study.config.sweep import Sweep
@@ -312,7 +312,7 @@ def _observations(measurements: Measurements, pressure: float | None) -> Iterabl
     if pressure is not None:
         for csd, fit in _brought(measurements, pressure).items():
             value, _, high = (float(end) for end in fit.resistance_at(pressure * KILOPASCAL))
-            yield Observation(f"{csd} at {pressure:g} kPa", csd, math.log(value), math.log(high / value) / NORMAL95)
+            yield Observation(f"{csd} at {pressure:g} kPa", csd, math.log(value), math.log(high / value) / quantile())
     for item in _as_they_are(measurements, pressure):
         yield Observation(item.name, item.csd, math.log(item.resistance), item.relative_se)
 

@@ -13,7 +13,6 @@ from typing import Annotated, Final, Literal, NamedTuple
 import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
-from scipy import special
 
 from filtercake.calibration.pooling import chi_square, improbable, scatter
 from filtercake.errors import ConfigError, FiltrationError, Problem
@@ -28,6 +27,7 @@ from filtercake.filtration.constant_pressure import (
     fit_differential,
     fit_integral,
 )
+from filtercake.statistics import quantile
 from filtercake.study.config.values import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText
 from filtercake.study.loading import parse
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, NUMBER, FloatArray, IntArray
@@ -57,9 +57,6 @@ REPEATABILITY: Final = 0.05
 
 SMALLEST_RELATIVE_SE: Final = 1e-6
 """Relative standard error of a resistance from data without noise."""
-
-NORMAL95: Final = float(special.ndtri(0.975))
-"""Half-width of a normal variable's 95 % interval over its standard deviation."""
 
 FIT_COLUMNS: Final = (
     "test",
@@ -336,7 +333,7 @@ def _exponent_limit(fit: CompressibilityFit, entries: Sequence[Measurement]) -> 
         return fit.exponent_ci95
     one, other = entries
     apart = abs(math.log((one.pressure_drop or math.nan) / (other.pressure_drop or math.nan)))
-    return NORMAL95 * math.hypot(one.relative_se, other.relative_se) / apart
+    return quantile() * math.hypot(one.relative_se, other.relative_se) / apart
 
 
 def with_pressure(measurements: Measurements) -> dict[str, list[Measurement]]:

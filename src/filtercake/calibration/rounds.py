@@ -433,6 +433,8 @@ def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
             for e in fit.estimates
         },
         "friction": settings.fixed_friction,
+        "threshold": fit.threshold,
+        "scale_freedom": fit.scale_freedom if math.isfinite(fit.scale_freedom) else None,
         "chi_square": fit.chi_square,
         "degrees_of_freedom": fit.degrees_of_freedom,
         "discrepancy": fit.discrepancy,
@@ -458,7 +460,8 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
 
     ``relative_uncertainty`` is as the fit takes it: with the scatter of measurements that contradict each other.
     ``left_out_m_kg`` is the resistance that the other distributions predict for this one; ``left_out_ln_error`` its
-    error, in ln(alpha), against the weighted mean of the distribution's measurements.
+    error, in ln(alpha), against the weighted mean of the distribution's measurements. ``scatter_freedom`` are the
+    degrees of freedom of that scatter; blank where the errors are known.
     """
     friction = settings.fixed_friction
     means = pooled(observations)
@@ -473,6 +476,7 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
                 "csd": item.csd,
                 "measured_m_kg": math.exp(item.ln_resistance),
                 "relative_uncertainty": math.hypot(item.standard_error, means[item.csd].scatter),
+                "scatter_freedom": freedom if math.isfinite(freedom := means[item.csd].freedom) else math.nan,
                 "modelled_m_kg": math.exp(float(mean[0])),
                 "modelled_low_m_kg": whole.low,
                 "modelled_high_m_kg": whole.high,

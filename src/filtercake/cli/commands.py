@@ -18,8 +18,8 @@ from filtercake import __version__, api
 from filtercake.cli import options as words
 from filtercake.crystals.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import publish
+from filtercake.statistics import half_width
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
@@ -258,7 +258,7 @@ def _run_pack(options: argparse.Namespace) -> int:
 
 
 def _interval(half: float | None, unit: str) -> str:
-    return unit if half is None else f"+- {_number(half)} {unit} (95 %)".replace("  ", " ")
+    return f"+- {'-' if half is None else _number(half)} {unit} (95 %)".replace("  ", " ")
 
 
 def _say(line: str) -> None:

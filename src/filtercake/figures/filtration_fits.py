@@ -125,8 +125,8 @@ def _results(fit: FiltrationFit) -> list[str]:
 def with_interval(value: float, half: float) -> str:
     """Write a value and its half-width, with two digits of the latter, in a power of ten."""
     largest = max(abs(value), half)
-    if not (math.isfinite(largest) and largest > 0.0):
-        return f"{value:g} ± {half:g}"
+    if not (math.isfinite(value + half) and largest > 0.0):
+        return f"{value:.4g} ± {half:g}".replace("nan", "–")
     exponent = math.floor(math.log10(largest))
     scaled, reach = value / 10.0**exponent, half / 10.0**exponent
     digits = min(max(1 - math.floor(math.log10(reach)), 0), MOST_DIGITS) if reach > 0.0 else MOST_DIGITS

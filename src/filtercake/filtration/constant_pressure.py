@@ -46,6 +46,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from filtercake.errors import FiltrationError
+from filtercake.statistics import quantile
 from filtercake.units import FloatArray
 
 BoolArray = NDArray[np.bool_]
@@ -64,7 +65,6 @@ result from the other's."""
 REFERENCE_PRESSURE: Final = 100e3
 """Pressure drop at which a compressible cake's resistance is quoted unless another is asked for, Pa."""
 
-_CONFIDENCE: Final = 0.95
 _POWERS: Final[dict[Form, tuple[int, ...]]] = {"integral": (1, 2), "differential": (0, 1, 2)}
 _SLOPE_OVER_CURVATURE: Final[dict[Form, float]] = {"integral": 1.0, "differential": 2.0}
 _SPARE: Final = 2
@@ -191,7 +191,7 @@ class FiltrationFit:
         line = rows @ np.array([self.time_offset, self.intercept, self.slope])
         variance = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)
         # round-off may leave a variance of nothing a little below it
-        return np.asarray(line), np.asarray(_quantile(self.dof) * np.sqrt(np.maximum(variance, 0.0)))
+        return np.asarray(line), np.asarray(quantile(self.dof) * np.sqrt(np.maximum(variance, 0.0)))
 
 
 def fit_integral(test: FiltrationTest, *, trim: bool = True) -> FiltrationFit:
@@ -367,9 +367,9 @@ def _power_law(x: FloatArray, y: FloatArray, error: FloatArray | None) -> tuple[
     quantile2 = math.nan
     if dof > 0:
         spread2 = float(np.sum((y * weight - design @ np.array([level, slope])) ** 2)) / dof
-        quantile2 = spread2 * _quantile(dof) ** 2
+        quantile2 = spread2 * quantile(dof) ** 2
         if error is not None:
-            quantile2 = max(quantile2, float(special.ndtri(0.5 + _CONFIDENCE / 2.0)) ** 2)
+            quantile2 = max(quantile2, quantile() ** 2)
     at_centre = np.diag(quantile2 / squared) if dof > 0 else np.full((2, 2), math.nan)
     move = np.array([[1.0, -centre], [0.0, 1.0]])
     return move @ np.array([level, slope]), np.asarray(move @ at_centre @ move.T)
@@ -415,7 +415,7 @@ def _result(
             f"{test.name}: the {form} form gives a cake resistance of {alpha:.4g} m/kg: must be positive; the readings "
             "do not slow down as a growing cake makes them (is the test long enough, is the pressure constant?)"
         )
-    alpha_ci, medium_ci = float(_quantile(dof) * alpha_se), float(_quantile(dof) * medium_se)
+    alpha_ci, medium_ci = float(quantile(dof) * alpha_se), float(quantile(dof) * medium_se)
     return FiltrationFit(
         form=form,
         resistance=alpha,
@@ -500,10 +500,6 @@ def _least_squares(design: FloatArray, time: FloatArray) -> tuple[FloatArray, Fl
     alone = free < 1e-6
     variance = np.where(alone, common, (residual / np.where(alone, 1.0, free)) ** 2)
     return np.asarray(coefficients), np.asarray(inverse @ (q.T * variance) @ q @ inverse.T)
-
-
-def _quantile(dof: int) -> float:
-    return float(special.stdtrit(dof, 0.5 + _CONFIDENCE / 2.0))
 
 
 def _check_readings(test: FiltrationTest) -> None:

@@ -159,6 +159,12 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_one_packing_has_a_dash_for_an_interval(tmp_path: Path, capsys: Capture) -> None:
+    assert main(["pack", *BED, "--replicates", "1", "--output", str(tmp_path / "bed")]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("+- -") == 2 and "nan" not in printed
+
+
 def test_pack_prints_what_porosity_and_resistance_find_in_its_files(packed: Path, capsys: Capture) -> None:
     before = {path.name: path.read_bytes() for path in packed.glob("r*.npz")}
     found = as_json(["pack", *BED, "--replicates", "2", "--output", str(packed)], capsys)

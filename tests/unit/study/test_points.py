@@ -20,10 +20,10 @@ from scipy import stats
 from filtercake.crystals.csd import from_table, mixture, to_table
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing, write_json
 from filtercake.packing.scene import Scene, digest, stage_seed
 from filtercake.results.replicates import REPLICATE_COLUMNS, SUMMARY_COLUMNS, replicates_table, summarise
+from filtercake.statistics import half_width
 from filtercake.study.loading import LoadedStudy
 from filtercake.study.points import POINT_COLUMNS, Point, expand, points_table
 
