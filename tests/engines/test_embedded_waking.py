@@ -157,7 +157,7 @@ def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, mon
     clock = [0.0]
     cloud = make_cloud(CSD, SCENE.particles, SCENE.initial_void_fraction, 1)
     scene = replace(SCENE, time_step=0.25e-6)
-    advance = embedded.Bed.advance
+    advance = Bed.advance
     lines = []
 
     def timed(bed, steps):
@@ -165,9 +165,9 @@ def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, mon
         advance(bed, steps)
 
     monkeypatch.setattr(embedded.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(embedded.Bed, "advance", timed)
+    monkeypatch.setattr(Bed, "advance", timed)
     monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.5)
-    run = embedded._Run(request(cloud, scene, tmp_path, lines.append), embedded.Bed.from_cloud(cloud, scene, 1))
+    run = embedded._Run(request(cloud, scene, tmp_path, lines.append), Bed.from_cloud(cloud, scene, 1))
     run.settle()
     took = clock[0] - 1000.0  # a second a check
     forecasts = [re.search(r"about (\d+) (min|s) left", line).groups() for line in lines]

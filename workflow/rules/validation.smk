@@ -468,7 +468,7 @@ rule coverage:
     message:
         "an interval asked for, again and again"
     script:
-        "../scripts/coverage.py"
+        "../scripts/interval_coverage.py"
 
 
 rule benchmark_page:
