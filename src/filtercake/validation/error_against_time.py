@@ -17,6 +17,7 @@ import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution, truncate
 from filtercake.packing import contact_law
+from filtercake.packing.analytic_models import PEERS
 from filtercake.packing.cloud import PLACEMENT_HEIGHT, box_length
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.embedded import Embedded
@@ -26,7 +27,6 @@ from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.scene import PackingSpec
 from filtercake.study import limits
 from filtercake.units import GRAVITY, MEGAPASCAL, MICROMETRE, MICROSECOND
-from filtercake.validation.analytic_models import PEERS
 from filtercake.validation.timing import Contender, contender, settle_timed, warm_up
 
 ESTIMATORS = {
