@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError
+from filtercake.packing.compiled import compiled
 from filtercake.packing.representation import merge_rare
 from filtercake.units import MICROMETRE, FloatArray, IntArray
 
@@ -184,7 +184,7 @@ def _grid_levels(radius: FloatArray, length: float, height: float) -> tuple[IntA
     return level, cells
 
 
-@njit(cache=True)
+@compiled
 def _place(
     position: FloatArray,
     radius: FloatArray,
@@ -223,7 +223,7 @@ def _place(
     return n
 
 
-@njit(cache=True)
+@compiled
 def _cell(x: float, y: float, z: float, height: float, cells: IntArray) -> int:
     cx = min(int(x * cells[0]), cells[0] - 1)
     cy = min(int(y * cells[1]), cells[1] - 1)
@@ -231,7 +231,7 @@ def _cell(x: float, y: float, z: float, height: float, cells: IntArray) -> int:
     return int((cz * cells[1] + cy) * cells[0] + cx)
 
 
-@njit(cache=True)
+@compiled
 def _is_free(
     x: float,
     y: float,

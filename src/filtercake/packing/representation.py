@@ -9,7 +9,7 @@ import numpy as np
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing.analytic_models import yu_zou_standish
 
-LEAST_EXPECTED = 1.0
+LEAST_EXPECTED = 1.0 - 1e-9
 """Spheres that a class must be expected to hold; rarer ones are merged with their neighbours."""
 CLOSE_PACKED = 0.36
 """Porosity of equal spheres for the analytic model that judges a representation."""
