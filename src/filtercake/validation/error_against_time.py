@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution, truncate
+from filtercake.packing.analytic_models import PEERS
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
@@ -33,7 +34,6 @@ from filtercake.statistics import (
 )
 from filtercake.study import limits
 from filtercake.units import GRAVITY, MEGAPASCAL, MICROMETRE, MICROSECOND, FloatArray
-from filtercake.validation.analytic_models import PEERS
 from filtercake.validation.timing import Contender, contender, settle_timed, warm_up
 
 ESTIMATORS = {
