@@ -1,6 +1,5 @@
 """What the embedded engine leaves out changes nothing: spheres in free fall, neighbour lists, and a stop halfway."""
 
-import os
 import re
 import subprocess
 import sys
@@ -152,24 +151,19 @@ def test_a_state_of_another_number_of_threads_is_refused():
         Bed.from_cloud(cloud, SPEC).restore(saved)
 
 
-def test_a_second_process_compiles_no_kernel_anew(tmp_path: Path):
-    """A loop compiled for every process anew costs each packing seconds, and nothing else shows it."""
+def test_a_second_process_compiles_no_kernel_anew():
+    """A loop compiled anew in every process costs each seconds, and nothing else shows it."""
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
         "from test_embedded_waking import CSD, SPEC, Bed, make_cloud\n"
         "bed = Bed.from_cloud(make_cloud(CSD, 20, SPEC.initial_void_fraction, 1), SPEC)\n"
         "bed.advance(20_000)\n"
-        "for kernel in (bed.kernel, bed.find_pairs):\n"
-        "    print(sum(kernel.stats.cache_hits.values()), sum(kernel.stats.cache_misses.values()))\n"
+        "print(*(sum(kernel.stats.cache_misses.values()) for kernel in (bed.kernel, bed.find_pairs)))\n"
     )
     command = [sys.executable, "-c", code, str(Path(__file__).parent)]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    first, second = (
-        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
-        for _ in range(2)
-    )
-    assert first == ["0", "1", "0", "1"]
-    assert second == ["1", "0", "1", "0"]
+    for _ in range(2):  # the first fills the cache, unless it is full
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["0", "0"]
 
 
 def test_reports_say_how_many_are_down_and_when_it_ends(tmp_path: Path, monkeypatch):
