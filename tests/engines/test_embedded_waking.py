@@ -145,18 +145,18 @@ def test_a_damaged_state_is_as_none(tmp_path: Path, damage):
 
 
 def test_a_state_of_another_number_of_threads_is_refused():
-    cloud = make_cloud(CSD, 60, SPEC.initial_void_fraction, 1)
-    saved = Bed.from_cloud(cloud, SPEC, threads=2).saved()
+    cloud = make_cloud(CSD, 60, SCENE.initial_void_fraction, 1)
+    saved = Bed.from_cloud(cloud, SCENE, threads=2).saved()
     with pytest.raises(ValueError, match="another number of threads"):
-        Bed.from_cloud(cloud, SPEC).restore(saved)
+        Bed.from_cloud(cloud, SCENE).restore(saved)
 
 
 def test_a_second_process_compiles_no_kernel_anew():
     """A loop compiled anew in every process costs each seconds, and nothing else shows it."""
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from test_embedded_waking import CSD, SPEC, Bed, make_cloud\n"
-        "bed = Bed.from_cloud(make_cloud(CSD, 20, SPEC.initial_void_fraction, 1), SPEC)\n"
+        "from test_embedded_waking import CSD, SCENE, Bed, make_cloud\n"
+        "bed = Bed.from_cloud(make_cloud(CSD, 20, SCENE.initial_void_fraction, 1), SCENE)\n"
         "bed.advance(20_000)\n"
         "print(*(sum(kernel.stats.cache_misses.values()) for kernel in (bed.kernel, bed.find_pairs)))\n"
     )
