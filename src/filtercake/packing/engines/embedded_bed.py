@@ -187,6 +187,8 @@ class Bed:
             else:
                 own[...] = saved[name]
         self.pairs = kernels.Pairs(*(np.array(saved[f"pairs_{name}"]) for name in kernels.Pairs._fields))
+        if self.pairs.bounds.size != self.threads + 1:
+            raise ValueError("the state is of a bed with another number of threads")
         self.force[0] = saved["totals"][0]
         if self.frictional:
             self.torque[0] = saved["totals"][1]

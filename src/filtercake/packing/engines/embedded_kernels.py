@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import prange
+from numba.misc.special import literally
 
 from filtercake.packing.compiled import cached_njit
 from filtercake.units import FloatArray, IntArray
@@ -207,8 +208,6 @@ FUSED = {"contract"}
 """Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
 
 _compiled = cached_njit(error_model="numpy", fastmath=FUSED)
-_inlined = cached_njit(error_model="numpy", fastmath=FUSED, forceinline=True)
-"""For what is told the kind of scene: inlined where the kind is a constant, it loses what this kind doesn't need."""
 
 # indices are unsigned: signed ones cost a test for negative values at every access
 IMAGE_SHIFT = np.uint32(28)
@@ -511,11 +510,12 @@ def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
                     torque[other, i, k] = 0.0
 
 
-@_inlined
+@_compiled
 def _pair_forces(
     part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, cohesive: bool, frictional: bool
 ) -> None:
     """Add the forces and torques of the pairs of one part's spheres to its layers."""
+    literally(cohesive), literally(frictional)  # compiled for each kind: what it doesn't need is not in its code
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[part], bodies.torque[part]
     last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
     spring, pair, length = pairs.spring, pairs.near_pair, law.length
@@ -596,9 +596,10 @@ def _pair_forces(
             torque[i, 2] += tz
 
 
-@_inlined
+@_compiled
 def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, cohesive: bool, frictional: bool) -> None:
     """Add the floor's forces and torques to the total."""
+    literally(cohesive), literally(frictional)
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     constants, spring, grounded = floor.constants, floor.spring, floor.grounded
     for k in range(grounded.size):
@@ -635,7 +636,7 @@ def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, co
             torque[i, 1] -= arm * px
 
 
-@_inlined
+@_compiled
 def _move(
     part: int, bodies: Bodies, patches: Patches, kick: float, frame_speed: float, law: Law, frictional: bool
 ) -> tuple[float, bool]:
@@ -644,6 +645,7 @@ def _move(
     ``kick`` is the time, s, that the force has acted. Returns the largest squared speed in the frame, and whether
     a sphere was faster than its patch may be.
     """
+    literally(frictional)
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     gravity, time_step = law.gravity, law.time_step
     fastest, too_fast = 0.0, False
@@ -683,8 +685,8 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
-    The kind is all that is bound here: numba finds a function that binds compiled ones in no cache. A threaded loop
-    gives each thread a share of the pairs and a force buffer of its own.
+    A threaded loop gives each thread a share of the pairs and a force buffer of its own. It binds plain numbers
+    alone: a loop that binds compiled functions is in no other process's cache.
     """
 
     @cached_njit(error_model="numpy", fastmath=FUSED, parallel=threaded)
