@@ -159,7 +159,9 @@ def test_too_many_points_or_distributions_are_refused(study_from: Callable[..., 
 def test_a_distribution_too_broad_for_any_bed_is_refused(
     study_from: Callable[..., LoadedStudy], good_study: str
 ) -> None:
-    broad = good_study.replace("size_um: 50", "size_um: 50000")
+    broad = good_study.replace("size_um: 50", "size_um: 50000").replace(
+        "material:", "material:\n  trust_units: true", 1
+    )
     with pytest.raises(ConfigError, match=r"csds.bimodal.mixture = 2 classes: needs .* spheres"):
         study_from(broad)
     assert study_from(broad.replace("sweeps:", "packing: {particles: 5000}\nsweeps:"))

@@ -29,6 +29,7 @@ from filtercake.packing.slab import bed_height
 from filtercake.results.filter_design import drum_filter
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.values import TO_NUMBER, Density, Model
+from filtercake.study.limits import unit_problems
 from filtercake.study.loading import LoadedStudy, check_study, parse
 from filtercake.units import HOUR, MICROMETRE
 
@@ -162,6 +163,7 @@ class ResistanceOptions(Model):
     sphericity: Annotated[float, Field(ge=0.01, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1.0, description="Sphericity of the crystals."
     )
+    trust_units: bool = Field(default=False, description="Take density and sizes as they are, however unlikely.")
 
 
 class FilterOptions(Filter):
@@ -218,7 +220,7 @@ def distribution(**options: Any) -> Distribution:
     28.57
     """
     options = {name: value for name, value in options.items() if value is not None}
-    material = {} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY}
+    material = {"trust_units": True, **({} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY})}
     study = load(options, material, {"particles": NARROW_PARTICLES})
     return _distribution(study, options)
 
@@ -231,7 +233,7 @@ def resistance(source: Distribution, **options: Any) -> Resistance:
     source : Distribution
         The size distribution; all of it counts, whatever is left out of the packing.
     **options
-        ``porosity``, ``density_kg_m3`` (not needed with kinetics), ``sphericity``.
+        ``porosity``, ``density_kg_m3`` (not needed with kinetics), ``sphericity``, ``trust_units``.
 
     Raises
     ------
@@ -242,6 +244,17 @@ def resistance(source: Distribution, **options: Any) -> Resistance:
     density = given.density_kg_m3 if given.density_kg_m3 is not None else source.density_kg_m3
     if density is None:
         raise ConfigError([_problem("density_kg_m3", "(missing)", "must be given")])
+    unlikely = () if given.trust_units else unit_problems(source.full, density)
+    problems = [
+        _problem(
+            "distribution" if finding.key == "sizes" else "density_kg_m3",
+            "" if finding.key == "sizes" else f"{density:g}",
+            f"{finding.text}; if the unit is right, say trust_units",
+        )
+        for finding in unlikely
+    ]
+    if problems:
+        raise ConfigError(problems)
     law = (given.porosity, source.full, density, given.sphericity)
     try:
         found = Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))

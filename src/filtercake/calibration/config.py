@@ -21,6 +21,7 @@ from filtercake.calibration.measurements import (
     same_pressure,
 )
 from filtercake.calibration.rounds import BATCHES, Candidate, Settings
+from filtercake.calibration.units_check import unit_problems
 from filtercake.errors import ConfigError, Problem, shown
 from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.filtration.resistance import implied_porosity
@@ -367,6 +368,7 @@ def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements
     for index, name in enumerate(model.predict):
         if name not in study.csds:
             yield Problem(str(path), f"predict[{index}]", repr(name), f"not in the study; allowed: {known}")
+    yield from unit_problems(measurements, study, model.measurements)
     for csd, fit in _brought(measurements, model.pressure_kPa).items():
         if not math.isfinite(fit.exponent_ci95):
             text = f"two measurements of {csd} give no interval at another pressure: add a third, or leave the key out"

@@ -116,7 +116,7 @@ class Finding:
     ----------
     kind : str
         ``flat``, ``several``, ``edge``, ``zero``, ``soft``, ``confounded``, ``contradiction``, ``pressure``,
-        ``misfit`` or ``friction``.
+        ``misfit``, ``failed`` or ``friction``.
     text : str
         The same in a sentence.
     """

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from filtercake import __version__, api
+from filtercake.calibration.measurements import FiltrationConditions
 from filtercake.cli import options as words
 from filtercake.crystals.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
@@ -46,6 +47,7 @@ EXAMPLES = {
     "rerun": "filtercake rerun report",
     "estimate": "filtercake estimate config/studies/pmma.yaml --cores 100",
     "porosity": "filtercake porosity packing/r0.npz --profile",
+    "test": "filtercake test config/measurements/synthetic_tests.yaml",
     "filter-area": (
         "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 "
         "--pressure-drop-kPa 53.3 --submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9"
@@ -103,6 +105,7 @@ def build_parser() -> words.Parser:
     _add_porosity(commands)
     _add_resistance(commands)
     _add_filter_area(commands)
+    _add_test(commands)
     _add_export(commands)
     _add_rerun(commands)
     _add_estimate(commands)
@@ -165,6 +168,21 @@ def _add_filter_area(commands: Any) -> None:
     text = "Area of a rotary drum filter (m2) for a slurry flow (m3/h), or the flow that an area can take."
     parser = _command(commands, "filter-area", _run_filter_area, text)
     words.add_model(parser.add_argument_group("filter and slurry"), api.FilterOptions)
+
+
+def _add_test(commands: Any) -> None:
+    text = (
+        "Specific cake resistance (m/kg) and medium resistance (1/m) of a filtration test at constant pressure, with "
+        "95 % intervals; which readings were left out, and why."
+    )
+    parser = _command(commands, "test", _run_test, text)
+    parser.add_argument(
+        "file",
+        metavar="FILE",
+        help="CSV of times and filtrate volumes or masses (time_s,volume_mL), with the options below; or a YAML file "
+        "of measurements, without them",
+    )
+    words.add_model(parser.add_argument_group("test, for a CSV"), FiltrationConditions)
 
 
 def _add_export(commands: Any) -> None:
@@ -321,6 +339,30 @@ def _run_filter_area(options: argparse.Namespace) -> int:
     if found.cake_thickness_mm is not None:
         lines.append(("cake thickness", found.cake_thickness_mm, "mm"))
     return _print_lines(lines)
+
+
+def _run_test(options: argparse.Namespace) -> int:
+    conditions = words.given(options, FiltrationConditions.model_fields)
+    if not options.file.endswith((".yaml", ".yml")):
+        found = [api.filtration_test(options.file, **conditions)]
+    elif conditions:
+        raise words.UsageError(f"{words.flag(next(iter(conditions)))}: goes with a CSV; {options.file} says it itself")
+    else:
+        found = api.filtration_tests(options.file)
+    if options.json:
+        return _print_json({"tests": [asdict(item) for item in found]})
+    for item in found:
+        print(f"{item.name} ({item.readings - item.readings_left_out} of {item.readings} readings, {item.form} form)")
+        _print_lines(
+            [
+                ("cake resistance", item.resistance_m_kg, _interval(item.resistance_ci95_m_kg, "m/kg")),
+                ("medium resistance", item.medium_resistance_1_m, _interval(item.medium_resistance_ci95_1_m, "1/m")),
+                ("filtration began at", item.time_zero_s, "s of the clock"),
+            ]
+        )
+        for note in item.notes:
+            print(f"- {words.with_flags(note, vars(options))}")
+    return 0
 
 
 def _run_export(options: argparse.Namespace) -> int:

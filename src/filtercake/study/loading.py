@@ -181,6 +181,7 @@ def check_study(values: Any, path: Path) -> LoadedStudy:
             csds[name] = _load_csd(name, csd, path.parent, model.crystallizer, kinetics)
         except (CsdError, CrystallizerError) as error:
             problems.append(Problem(str(path), *_source_of(name, csd), str(error)))
+    problems += _unit_problems(model, csds, str(path))
     problems += _stability_problems(model, csds, str(path))
     problems += _bed_problems(model, csds, str(path))
     if problems:
@@ -364,6 +365,19 @@ def _values(model: Study, index: int, name: str) -> list[tuple[str, float]]:
     if given is None:
         return [(f"material.{name}", getattr(model.material, name))]
     return [(f"sweeps[{index}].{name}[{j}]", value) for j, value in enumerate(given)]
+
+
+def _unit_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterable[Problem]:
+    """Densities and sizes that must be in another unit, one problem per key."""
+    found: dict[str, Problem] = {}
+    for name, csd in () if model.material.trust_units else csds.items():
+        for finding in limits.unit_problems(csd.full, model.material.density):
+            key, value = ("material.density_kg_m3", f"{model.material.density:g}")
+            if finding.key == "sizes":
+                key, value = _source_of(name, model.csds[name])
+            text = f"{finding.text}; if the unit is right, set material.trust_units: true"
+            found.setdefault(key, Problem(file, key, value, text))
+    return found.values()
 
 
 def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> list[Problem]:

@@ -28,7 +28,7 @@ DRUM = [
     *["--slurry-concentration-kg-m3", "200", "--pressure-drop-kPa", "53.33", "--submerged-fraction", "0.3"],
     *["--rotation-rate-rpm", "0.2", "--medium-resistance-1-m", "5e9"],
 ]
-COMMANDS = ["csd", "pack", "porosity", "resistance", "filter-area"]
+COMMANDS = ["csd", "pack", "porosity", "resistance", "filter-area", "test"]
 ALL_COMMANDS = [*COMMANDS, "export", "rerun"]
 BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
 
@@ -362,3 +362,47 @@ def test_no_filter_makes_it_fall_over(values: list[float], inverse: bool) -> Non
 def test_no_crystallizer_makes_it_fall_over(width: float, time: float, slurry: float) -> None:
     values = [f"--bin-width-um={width!r}", f"--residence-time-min={time!r}", f"--slurry-concentration-kg-m3={slurry!r}"]
     assert main(["csd", "--json", "--kinetics", "potassium_nitrate", *values]) in (0, 2)
+
+
+LEAF_TESTS = Path(__file__).resolve().parents[2] / "data" / "leaf_tests"
+CONDITIONS = [
+    *["--area-cm2", "50", "--pressure-drop-kPa", "70", "--viscosity-mPa-s", "1"],
+    *["--solids-per-filtrate-kg-m3", "100"],
+]
+
+
+def test_a_filtration_test(capsys: Capture) -> None:
+    found = as_json(["test", str(LEAF_TESTS / "short_tail.csv"), *CONDITIONS], capsys)
+    (test,) = found["tests"]  # type: ignore[misc]
+    assert test["resistance_m_kg"] == pytest.approx(3.5e9) and test["medium_resistance_1_m"] == pytest.approx(1.75e10)
+    assert (test["readings"], test["readings_left_out"], test["time_zero_s"]) == (13, 3, 0.0)
+    assert main(["test", str(LEAF_TESTS / "short_tail.csv"), *CONDITIONS]) == 0
+    out = capsys.readouterr().out
+    assert "short_tail (10 of 13 readings, integral form)" in out and "3.5e+09 +- " in out and "m/kg (95 %)" in out
+    assert "- end of the test: lines 12 to 14 left out" in out
+
+
+def test_filtration_tests_of_a_file_of_measurements(capsys: Capture) -> None:
+    path = "config/measurements/synthetic_tests.yaml"
+    found = as_json(["test", str(LEAF_TESTS.parents[2] / path)], capsys)
+    assert found["tests"][0]["name"] == "synthetic_25kPa"  # type: ignore[index]
+    text = complaint(["test", path, "--area-cm2", "3"], capsys)
+    assert f"--area-cm2: goes with a CSV; {path} says it itself" in text
+
+
+def test_what_is_wrong_with_a_filtration_test_is_said(capsys: Capture) -> None:
+    balance = ["test", str(LEAF_TESTS / "balance.csv"), *CONDITIONS]
+    assert "holds masses of filtrate: give --filtrate-density-kg-m3" in complaint(balance, capsys)
+    found = as_json([*balance, "--filtrate-density-kg-m3", "789"], capsys)
+    assert found["tests"][0]["resistance_m_kg"] == pytest.approx(3.5e9)  # type: ignore[index]
+    assert "--area-cm2: must be given" in complaint(["test", str(LEAF_TESTS / "base.csv")], capsys)
+    assert "cannot be read" in complaint(["test", "none.csv", *CONDITIONS], capsys)
+
+
+def test_units_that_cannot_be(capsys: Capture) -> None:
+    light = ["resistance", "--porosity", "0.36", "--density-kg-m3", "1.18", *PMMA]
+    said = "--density-kg-m3 = 1.18: lighter than any solid (under 300 kg/m3): in g/cm3? (1180 kg/m3)"
+    assert said in complaint(light, capsys)
+    assert as_json([*light, "--trust-units"], capsys)["resistance_m_kg"] > 1e12  # type: ignore[operator]
+    fine = ["resistance", "--porosity", "0.36", "--density-kg-m3", "1180", "--mixture", "0.02:0.5,0.05:0.5"]
+    assert "0.02 to 0.05 um: no filter holds crystals so fine: were they in mm or cm?" in complaint(fine, capsys)
