@@ -11,8 +11,10 @@ import pytest
 
 from filtercake.calibration.config import load_calibration
 from filtercake.calibration.measurements import load_measurements, read_test
+from filtercake.crystals.cells import LARGEST_FILE
 from filtercake.crystals.crystallizer import load_kinetics
-from filtercake.crystals.csd import LARGEST_FILE, MOST_CLASSES, read_csd
+from filtercake.crystals.csd import read_csd
+from filtercake.crystals.instruments import MOST_CLASSES
 from filtercake.errors import (
     MOST_SHOWN,
     ConfigError,

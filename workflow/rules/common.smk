@@ -12,7 +12,11 @@ from filtercake.run import console
 from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.run.provenance import packing_sources, sources
 from filtercake.study import engine_choice, estimate
-from filtercake.study.loading import find_studies, load_studies
+from filtercake.study.loading import (
+    find_studies,
+    load_studies,
+    with_names_as_written,
+)
 from filtercake.study.points import expand as expand_points
 from filtercake.units import MICROMETRE
 from snakemake.exceptions import WorkflowError
@@ -38,7 +42,11 @@ def points_by_name(studies):
 
 
 try:
-    settings = load_workflow(dict(config), CONFIG_FILE)
+    files = [CONFIG_FILE, *workflow.overwrite_configfiles]
+    named = with_names_as_written(
+        config, map(Path, files), workflow.config_settings.config_args or []
+    )
+    settings = load_workflow(named, CONFIG_FILE)
     STUDIES = {
         study.name: study
         for study in load_studies(
@@ -140,8 +148,7 @@ def figures_of(study):
 def csd_params(wildcards):
     study = study_of(wildcards)
     csd, state = study.model.csds[wildcards.csd], study.csds[wildcards.csd].crystallizer
-    classes = [[item.size_um, item.volume_fraction] for item in csd.mixture or []]
-    found = {"classes": classes, "truncation": csd.truncation}
+    found = {**csd.recipe, "truncation": csd.truncation}
     if state is not None:
         found["size_scale_um"] = state.size_scale / MICROMETRE
         found["bin_width_um"] = study.model.crystallizer.bin_width_um
@@ -215,6 +222,12 @@ def begin_run():
     for name in points_of_run():
         for warning in KNOWN[name].warnings:
             print(f"warning: {warning}", file=sys.stderr)
+        for csd, item in KNOWN[name].csds.items():
+            if item.file is not None:
+                print(
+                    f"{name}: {csd}: {item.file}: {item.full.understood}",
+                    file=sys.stderr,
+                )
     if points_of_run():
         print(console.plan(points_of_run(), packings), file=sys.stderr)
     if to_make:

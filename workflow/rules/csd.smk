@@ -4,7 +4,7 @@
 rule csd:
     input:
         file=csd_file,
-        library=library("crystals.crystallizer"),
+        library=library("crystals.crystallizer") + library("crystals.size_laws"),
     output:
         "{results}/{study}/csd/{csd}.csv",
     log:

@@ -5,12 +5,13 @@ from pathlib import Path
 import pandas as pd
 
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.validation.twin import Experiment, repeat_calibrations, summarise
 
 with job(snakemake.log[0], snakemake.output) as log:
     pool, truth = (
-        pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
+        pd.concat([read_table(file) for file in files], ignore_index=True)
         for files in (snakemake.input.pool, snakemake.input.truth)
     )
     count, asked = snakemake.params.repeats, Experiment(snakemake.params.tests, snakemake.params.noise)

@@ -232,7 +232,9 @@ def _run_csd(options: argparse.Namespace) -> int:
         "kept_volume_fraction": found.kept_volume_fraction,
     }
     if options.json:
-        return _print_json({"classes": table.to_dict("records"), **values})
+        return _print_json({"understood": full.understood, "classes": table.to_dict("records"), **values})
+    if full.understood:
+        print(f"{options.file or 'distribution'}: {full.understood}\n")
     _print_table(
         ["size, um", "volume fraction", "number fraction", "packed volume fraction"], table.iloc[:, [0, 1, 2, 5]]
     )
@@ -250,10 +252,17 @@ def _run_csd(options: argparse.Namespace) -> int:
     )
 
 
+def _say_understood(options: argparse.Namespace, source: api.Distribution) -> None:
+    """Say how a distribution was read, once nothing else is wrong."""
+    if source.full.understood:
+        _say(f"{options.file or 'distribution'}: {source.full.understood}")
+
+
 def _run_pack(options: argparse.Namespace) -> int:
     source = api.distribution(**words.source(options))
     asked = words.given(options, (*Material.model_fields, *Packing.model_fields))
     found = api.pack(source, options.output, say=_say, **asked)
+    _say_understood(options, source)
     for warning in found.warnings:
         _say(f"warning: {words.with_flags(warning, vars(options))}")
     summary, status = found.summary, 0 if found.files else FAILED
@@ -315,6 +324,7 @@ def _run_porosity(options: argparse.Namespace) -> int:
 def _run_resistance(options: argparse.Namespace) -> int:
     source = api.distribution(**words.source(options))
     found = api.resistance(source, **words.given(options, api.ResistanceOptions.model_fields))
+    _say_understood(options, source)
     if options.json:
         return _print_json(asdict(found))
     return _print_lines(

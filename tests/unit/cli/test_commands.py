@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 import shutil
 from collections.abc import Iterator
 from itertools import chain
@@ -71,6 +72,28 @@ def test_csd_of_the_papers_crystallizer(capsys: Capture, tmp_path: Path) -> None
     assert again["sum_x_over_d2_1_m2"] == pytest.approx(found["sum_x_over_d2_1_m2"], rel=0.01)
 
 
+def test_a_law_of_few_numbers(capsys: Capture) -> None:
+    beads = as_json(["csd", "--lognormal", "53.5,74.796,104.309"], capsys)
+    assert beads["sauter_mean_um"] == pytest.approx(72.289, rel=2e-3)  # the instrument's own
+    assert 0.99 < beads["kept_volume_fraction"] < 1.0  # without its tails
+    milled = as_json(["csd", "--rosin-rammler", "60,3", "--truncate-below-volume-fraction", "0"], capsys)
+    assert milled["sum_x_over_d_1_m"] == pytest.approx(math.gamma(2 / 3) / 60e-6, rel=1e-12)
+    assert milled["kept_volume_fraction"] == pytest.approx(1.0)
+    assert main(["resistance", "--porosity", "0.4", "--density-kg-m3", "1180", "--rosin-rammler", "60,3"]) == 0
+    assert "distribution: Rosin-Rammler by volume: d' 60 um" in capsys.readouterr().err
+
+
+def test_how_a_file_was_read_is_said(capsys: Capture, tmp_path: Path) -> None:
+    file = tmp_path / "x.csv"
+    file.write_text("size_um;volume_percent\n20-30;40\n30-50;60\n")
+    said = "class edges, geometric middles; % by volume; semicolons; 2 classes"
+    assert as_json(["csd", str(file)], capsys)["understood"] == said
+    assert main(["csd", str(file)]) == 0
+    assert capsys.readouterr().out.startswith(f"{file}: {said}\n")
+    assert main(["resistance", "--porosity", "0.4", "--density-kg-m3", "1180", str(file)]) == 0
+    assert capsys.readouterr().err == f"{file}: {said}\n"
+
+
 def test_csd_in_words(capsys: Capture) -> None:
     assert main(["csd", *PMMA]) == 0
     printed = capsys.readouterr().out
@@ -102,10 +125,14 @@ def test_filter_area_and_its_inverse(capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["csd"], "one of FILE, --mixture and --kinetics"),
-        (["csd", "a.csv", *PMMA], "one of FILE, --mixture and --kinetics"),
+        (["csd"], "one of FILE, --mixture, --lognormal, --rosin-rammler and --kinetics"),
+        (["csd", "a.csv", *PMMA], "one of FILE, --mixture, --lognormal, --rosin-rammler and --kinetics"),
         (["csd", "no/such.csv"], "no/such.csv: cannot be read"),
         (["csd", "--mixture", "20"], "--mixture = 20: must be sizes"),
+        (["csd", "--lognormal", "20,80"], "--lognormal = ['20', '80']: must be 3 numbers: d10_um, d50_um, d90_um"),
+        (["csd", "--lognormal", "20,40,100"], "are not of a lognormal distribution: d50 is -11% off"),
+        (["csd", "--rosin-rammler", "60,1.5"], "exponent = 1.5: must be above 2"),
+        (["csd", "--rosin-rammler", "60,x"], "--rosin-rammler = x: must be a number"),
         (["csd", "--mixture", "20:0.5,50:0.2"], "sum to 0.7"),
         (["csd", "--mixture", "nan:1"], "--mixture = nan: must be"),
         (["csd", "--mixture", "1e-300:1"], "--mixture = 1e-300: must be greater than or equal to 0.001"),
