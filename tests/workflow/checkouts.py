@@ -56,7 +56,7 @@ def copy_project(target: Path) -> Checkout:
     for part in PARTS:
         source = PROJECT / part
         if source.is_dir():
-            shutil.copytree(source, target / part, ignore=shutil.ignore_patterns("*.egg-info"))
+            shutil.copytree(source, target / part, symlinks=True, ignore=shutil.ignore_patterns("*.egg-info"))
         else:
             shutil.copy(source, target / part)
     return Checkout(target)

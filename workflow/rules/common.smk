@@ -14,7 +14,7 @@ from filtercake.packing.pack import MANIFEST
 from filtercake.packing.result import read_record
 from filtercake.run import console
 from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
-from filtercake.run.provenance import packing_sources, sources
+from filtercake.run.provenance import code_hash, packing_code, sources
 from filtercake.study import engine_choice, estimate
 from filtercake.study.loading import find_studies, load_studies
 from filtercake.study.points import expand as expand_points, with_engine
@@ -75,13 +75,8 @@ wildcard_constraints:
 
 
 def library(module):
-    """Library files behind a module: inputs, because Snakemake does not see imports."""
-    return [str(path) for path in sources(module)]
-
-
-def packing_library(wildcards):
-    """Those behind a point's packings: of the engines, only the one it uses."""
-    return [str(path) for path in packing_sources(point_of(wildcards).spec.engine)]
+    """Hash of the library's code behind a module: a param of rules, because Snakemake does not see imports."""
+    return code_hash(sources(module))
 
 
 def study_of(wildcards):

@@ -5,10 +5,6 @@
 rule packing:
     input:
         csd=lambda wildcards: f"{RESULTS}/{wildcards.study}/csd/{point_of(wildcards).csd}.csv",
-        library=packing_library,
-        templates=sorted(
-            str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
-        ),
     output:
         "{results}/{study}/packings/{point}/replicates.json",
     log:
@@ -25,6 +21,7 @@ rule packing:
         runtime=packing_minutes,
         cpus_per_task=lambda wildcards: parallelism(point_of(wildcards).spec),
     params:
+        code=lambda wildcards: packing_code(point_of(wildcards).spec.engine),
         spec=lambda wildcards: point_of(wildcards).spec.as_dict(),
         replicates=lambda wildcards: point_of(wildcards).replicates,
         most=lambda wildcards: point_of(wildcards).most_replicates,

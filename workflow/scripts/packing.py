@@ -9,10 +9,9 @@ from filtercake.packing.pack import pack_replicates
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.scene import PackingSpec
 from filtercake.run.job import Progress, job
-from filtercake.run.provenance import code_hash
 
 
-def main(table, sources, spec, asked, manifest, point, logger):
+def main(table, spec, asked, manifest, point, logger):
     """Pack and report each replicate as it comes."""
     progress = Progress()
 
@@ -29,10 +28,9 @@ def main(table, sources, spec, asked, manifest, point, logger):
         progress.note(f"{point} {line}")
 
     _, truncated = from_table(pd.read_csv(table))
-    code = code_hash([Path(source) for source in sources])
     spec = PackingSpec.from_dict(spec)
     enough = UntilNarrow(spec, asked.interval, asked.replicates) if asked.interval else lambda _: False
-    pack_replicates(spec, truncated, asked.most, Path(manifest).parent, code, report, note, enough)
+    pack_replicates(spec, truncated, asked.most, Path(manifest).parent, asked.code, report, note, enough)
     if asked.interval:
         note(f"interval {enough.half_width:.2g} after {len(enough.values)} packings, {asked.interval:g} asked for")
 
@@ -40,7 +38,6 @@ def main(table, sources, spec, asked, manifest, point, logger):
 with job(snakemake.log[0], snakemake.output) as log:
     main(
         snakemake.input.csd,
-        [*snakemake.input.library, *snakemake.input.templates],
         snakemake.params.spec,
         snakemake.params,
         snakemake.output[0],

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
-from filtercake.api.pack import code_of
 from filtercake.api.steps import PackingPorosity, porosity
 from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, from_table, to_table
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
@@ -24,7 +23,7 @@ from filtercake.packing.pack import MANIFEST, cloud_seed, pack
 from filtercake.packing.result import SettledState, read_record, write_json
 from filtercake.packing.scene import PackingSpec, stage_seed
 from filtercake.packing.settling import StopRule
-from filtercake.run.provenance import ROOT, describe
+from filtercake.run.provenance import ROOT, describe, packing_code
 from filtercake.study import engine_choice
 from filtercake.study.config.values import NAME
 from filtercake.study.loading import LoadedStudy, load_study
@@ -209,7 +208,7 @@ def _write(
         "size_m": csd.size.tolist(),
         "volume_fraction": csd.volume_fraction.tolist(),
         "seeds": {"base": spec.seed, "cloud": seed, "engine": stage_seed(seed, "engine")},
-        "code": code_of(spec.engine),
+        "code": packing_code(spec.engine),
     }
     write_json(folder / INPUT, found)
     write_json(folder / "versions.json", {**describe(ROOT), "engine": _engine_words(spec.engine)})

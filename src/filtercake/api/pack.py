@@ -14,13 +14,12 @@ import pandas as pd
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
 from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.errors import ConfigError, Problem
-from filtercake.packing.engines.liggghts import template_folder
 from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.result import Packing as SettledPacking
 from filtercake.packing.result import write_json
 from filtercake.results.replicates import REPLICATE_COLUMNS, failed_row, replicate_row, summarise
-from filtercake.run.provenance import code_hash, packing_sources, versions
+from filtercake.run.provenance import packing_code, versions
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
 from filtercake.study.points import Point, base_point
@@ -107,11 +106,6 @@ def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None,
     )
 
 
-def code_of(engine: str) -> str:
-    """Hash of the code and the decks behind packings by an engine."""
-    return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
-
-
 def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Say) -> list[Outcome]:
     def report(outcome: Outcome, record: dict[str, Any]) -> None:
         if outcome.status == "ok":
@@ -119,7 +113,7 @@ def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Say) ->
         else:
             say(f"r{outcome.replicate} failed: {outcome.reason}")
 
-    interval, code = point.porosity_ci95_target, code_of(point.spec.engine)
+    interval, code = point.porosity_ci95_target, packing_code(point.spec.engine)
     enough: Callable[[Path], bool] = lambda _: False  # noqa: E731 - the other branch is an object
     if interval is not None:
         enough = UntilNarrow(point.spec, interval, point.replicates)
