@@ -51,7 +51,8 @@ class Checkout:
 
 
 def copy_project(target: Path) -> Checkout:
-    """Copy the project, with the kernels that are compiled already."""
+    """Copy the project, with the kernels that are compiled already, to a path that nobody would choose."""
+    target = target.with_name(f"user's own {target.name}")
     target.mkdir(parents=True, exist_ok=True)
     for part in PARTS:
         source = PROJECT / part

@@ -71,6 +71,10 @@ def edited(path, change):
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
+def changed(text):
+    return text + "\nEDITED = True\n"
+
+
 def commented(text):
     return text + "\n# edited\n"
 
@@ -89,13 +93,18 @@ def commented(text):
     ],
 )
 def test_an_edit_reruns_exactly_what_depends_on_it(finished, file, rules):
-    with edited(finished.root / file, commented):
+    with edited(finished.root / file, changed):
         planned = finished.planned()
     assert set(planned) - {"all"} == rules
     assert planned["packing"] in (0, 5)
     if file.endswith("cross_section.py"):
         assert planned["figure"] == 1
     assert not finished.planned()
+
+
+def test_a_comment_in_the_library_remakes_nothing(finished):
+    with edited(finished.root / "src/filtercake/crystals/csd.py", commented):
+        assert not finished.planned()
 
 
 def test_a_new_value_in_the_study_makes_only_the_new_points(finished):
