@@ -27,7 +27,8 @@ for handler in logger.handlers:
     if handler.name == "DefaultStreamHandler":
         handler.addFilter(console.worth_reading)
 
-ROOT = Path(workflow.basedir)
+STUDY_FILES = Path(in_use("config/studies"))
+CALIBRATION_FILES = Path(in_use("config/calibrations"))
 
 
 def points_by_name(studies):
@@ -43,15 +44,13 @@ try:
     settings = load_workflow(dict(config), CONFIG_FILE)
     STUDIES = {
         study.name: study
-        for study in load_studies(
-            find_studies(settings, ROOT / "config" / "studies", CONFIG_FILE)
-        )
+        for study in load_studies(find_studies(settings, STUDY_FILES, CONFIG_FILE))
     }
     POINTS = points_by_name(STUDIES)
     CALIBRATIONS = load_calibrations(
         settings.calibrations,
-        ROOT / "config" / "calibrations",
-        ROOT / "config" / "studies",
+        CALIBRATION_FILES,
+        STUDY_FILES,
         CONFIG_FILE,
     )
     engine_choice.check([*STUDIES.values(), *(item.study for item in CALIBRATIONS)])

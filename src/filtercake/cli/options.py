@@ -123,6 +123,8 @@ def unknown(words: list[str], known: Iterable[str]) -> str:
 
 
 def _problem_in_words(problem: Problem, known: set[str]) -> str:
+    if problem.file != str(ORIGIN):  # in a file, whose keys are no options
+        return str(problem)
     name = _option_of(problem.key, known)
     text = with_flags(problem.allowed, known)
     if problem.key == "distribution":
