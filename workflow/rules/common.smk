@@ -1,16 +1,20 @@
 # Loads and checks the configuration, and offers the helpers that the rules share. Stops here, before any job,
 # with every problem of every file when something is wrong.
+import atexit
 import os
 import time
+from dataclasses import replace
 
 from filtercake.calibration.config import (
     candidates as calibration_candidates,
     load_calibrations,
     settings_of,
 )
+import pandas as pd
+from filtercake.crystals.csd import from_table
 from filtercake.figures import calibrated, catalogue
 from filtercake.packing.engines.base import parallelism
-from filtercake.packing.pack import MANIFEST
+from filtercake.packing.pack import MANIFEST, count_kept, point_key
 from filtercake.packing.result import read_record
 from filtercake.run import console
 from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
@@ -173,24 +177,58 @@ def points_of_run():
 
 
 def points_to_make():
-    """Points by study whose packings are about to be made."""
+    """Points by study and name whose packings are about to be made."""
     found = {}
-    for job in workflow.dag.needrun_jobs():
+    for job in workflow.dag.needrun_jobs(exclude_finished=False):
         if job.rule.name == "packing":
-            found.setdefault(job.wildcards.study, []).append(point_of(job.wildcards))
+            point = point_of(job.wildcards)
+            found.setdefault(job.wildcards.study, {})[point.name] = point
     return found
 
 
-def cost_of(points_by_study):
+def missing_packings(study, point):
+    """How many of a point's packings are to be made; those finished before are kept."""
+    folder, table = Path(RESULTS, study), Path(
+        RESULTS, study, "csd", f"{point.csd}.csv"
+    )
+    packings = folder / "packings" / point.name
+    if not (packings.is_dir() and table.is_file()):
+        return point.replicates
+    _, csd = from_table(pd.read_csv(table))
+    key = point_key(packing_code(point.spec.engine), point.spec, csd)
+    return point.replicates - count_kept(packings, key, point.replicates)
+
+
+def cost_of(points_by_study, missing):
     """What the packings of points will cost."""
     return estimate.together(
         estimate.estimate(
-            points,
+            [
+                replace(point, replicates=missing[study][name])
+                for name, point in points.items()
+            ],
             {name: csd.truncated for name, csd in KNOWN[study].csds.items()},
             on_cluster=not workflow.local_exec,
         )
         for study, points in points_by_study.items()
     )
+
+
+def announcement():
+    """The plan of the run, and the number of packings in it."""
+    to_make = points_to_make()
+    missing = {
+        study: {name: missing_packings(study, point) for name, point in points.items()}
+        for study, points in to_make.items()
+    }
+    lines = []
+    for name in points_of_run():
+        lines += [f"warning: {warning}" for warning in KNOWN[name].warnings]
+    if points_of_run():
+        lines.append(console.plan(points_of_run(), missing))
+    if to_make:
+        lines.append(cost_of(to_make, missing).words(cores_of_run()))
+    return "\n".join(lines), sum(sum(group.values()) for group in missing.values())
 
 
 def cluster_logs():
@@ -206,21 +244,26 @@ def cores_of_run():
 
 
 def begin_run():
-    to_make = points_to_make()
-    packings = sum(point.replicates for group in to_make.values() for point in group)
+    text, packings = announcement()
     try:
         Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), packings)
     except OSError as error:
         raise WorkflowError(
             f"the results folder {RESULTS} cannot be written: {error.strerror}"
         )
-    for name in points_of_run():
-        for warning in KNOWN[name].warnings:
-            print(f"warning: {warning}", file=sys.stderr)
-    if points_of_run():
-        print(console.plan(points_of_run(), packings), file=sys.stderr)
-    if to_make:
-        print(cost_of(to_make).words(cores_of_run()), file=sys.stderr)
+    if text:
+        print(text, file=sys.stderr)
+
+
+def announce_dry_run():
+    # there are no jobs where the run could not even be planned
+    if workflow.dryrun and workflow.dag is not None:
+        print(announcement()[0], file=sys.stderr)
+
+
+if not is_module:
+    # Snakemake starts no handler for a dry run, and says after the rules are read that it is one
+    atexit.register(announce_dry_run)
 
 
 def bed_size_tables(wildcards):

@@ -13,11 +13,11 @@ import pandas as pd
 
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
 from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
-from filtercake.errors import ConfigError, Problem
-from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates
+from filtercake.errors import ConfigError, PackingRejected, Problem
+from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates, point_key
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.result import Packing as SettledPacking
-from filtercake.packing.result import write_json
+from filtercake.packing.result import read_sealed, write_json
 from filtercake.results.replicates import REPLICATE_COLUMNS, failed_row, replicate_row, summarise
 from filtercake.run.provenance import packing_code, versions
 from filtercake.study import engine_choice
@@ -58,7 +58,9 @@ class Bed:
     warnings: tuple[str, ...]
 
 
-def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None, **options: Any) -> Bed:
+def pack(
+    source: Distribution, folder: str | Path, *, say: Say = lambda _: None, replace: bool = False, **options: Any
+) -> Bed:
     """Pack spheres of a size distribution, and measure porosity and resistance.
 
     Packings that ``folder`` holds of the same arguments are kept, so that more of them, or a narrower interval, may be
@@ -72,6 +74,8 @@ def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None,
         Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
     say : callable
         Takes a line about each packing as it comes.
+    replace : bool
+        Whether packings of other options, or of another version of the program, may be lost; an error otherwise.
     **options
         The keys of the configuration's blocks ``material`` and ``packing``.
 
@@ -91,6 +95,8 @@ def pack(source: Distribution, folder: str | Path, *, say: Say = lambda _: None,
     csd = study.csds[name]
     # a resistance beyond floating point is found before the packings are made, not after
     resistance(source, porosity=0.01, density_kg_m3=point.spec.density, sphericity=study.model.material.sphericity)
+    if not replace:
+        _check_packings(path, point_key(packing_code(point.spec.engine), point.spec, csd.truncated))
     outcomes = _make(point, csd.truncated, path, say)
     sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
     rows = [_row(point, outcome, path, sizes, sphericity) for outcome in outcomes]
@@ -145,3 +151,16 @@ def _check_folder(folder: Path) -> None:
     if foreign:
         allowed = f"must be new, empty, or a folder of packings; it holds {foreign[0]}"
         raise ConfigError([Problem(str(ORIGIN), "output", str(folder), allowed)])
+
+
+def _check_packings(folder: Path, key: str) -> None:
+    """Refuse a folder whose packings follow from anything else than ``key``; damaged ones are made again anyway."""
+    for path in sorted(folder.glob("r*.json")):
+        try:
+            same = read_sealed(path).get("key") == key
+        except (PackingRejected, OSError):
+            continue
+        if not same:
+            whose = f"holds {path.stem} of other options or of another version"
+            allowed = f"{whose}: choose another folder, or replace its packings"
+            raise ConfigError([Problem(str(ORIGIN), "output", str(folder), allowed)])

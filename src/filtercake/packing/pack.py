@@ -186,9 +186,9 @@ def pack_replicates(
     code : str
         Hash of the code and decks behind the packing.
     report : callable
-        Called with every outcome and its record as it comes.
+        Called with the outcome of every packing that is made, and its record, as it comes.
     progress : callable
-        Takes a line about a long packing.
+        Takes a line about a long packing, or one that is kept.
     enough : callable
         Called with the geometry file of every accepted packing; says whether no further one is needed.
 
@@ -197,23 +197,31 @@ def pack_replicates(
     EngineMissing
         If the engine is not installed: no replicate could be made.
     """
-    key = digest(code, spec.as_dict(), csd.size.tolist(), csd.volume_fraction.tolist())
+    key = point_key(code, spec, csd)
     engine = get_engine(spec.engine)
     work = folder / WORK
     shutil.rmtree(work, ignore_errors=True)
     outcomes = []
     for replicate in range(replicates):
         npz = folder / f"r{replicate}.npz"
-        outcome, record = finished(npz, key, replicate) or (None, {})
-        if outcome is None:
+        kept = finished(npz, key, replicate)
+        if kept is not None:
+            outcome = kept[0]
+            progress(f"r{replicate} is kept")
+        else:
             outcome, record = _attempt(spec, csd, replicate, npz, key, engine, work, progress)
-        report(outcome, record)
+            report(outcome, record)
         outcomes.append(outcome)
         if outcome.status == "ok" and enough(npz):
             break
     shutil.rmtree(work, ignore_errors=True)
     write_json(folder / MANIFEST, sealed({"key": key, "replicates": [vars(outcome) for outcome in outcomes]}))
     return outcomes
+
+
+def point_key(code: str, spec: PackingSpec, csd: CrystalSizeDistribution) -> str:
+    """Hash of all that a point's packings follow from."""
+    return digest(code, spec.as_dict(), csd.size.tolist(), csd.volume_fraction.tolist())
 
 
 def finished(npz: Path, key: str, replicate: int) -> tuple[Outcome, dict[str, Any]] | None:
@@ -226,6 +234,17 @@ def finished(npz: Path, key: str, replicate: int) -> tuple[Outcome, dict[str, An
         return None
     outcome = Outcome(replicate, "ok", "", record["seed"], record["sha256"], record["attempts"])
     return outcome, record
+
+
+def count_kept(folder: Path, key: str, replicates: int) -> int:
+    """Count the replicates that will be kept, by their records alone, which is quick."""
+    count = 0
+    for replicate in range(replicates):
+        try:
+            count += read_sealed(folder / f"r{replicate}.json").get("key") == key
+        except (PackingRejected, OSError):
+            continue
+    return count
 
 
 def whole(manifest: Path) -> bool:
