@@ -152,7 +152,7 @@ rule calibration_figure:
         "../envs/filtercake.yaml"
     resources:
         mem_mb=2000,
-        runtime=15,
+        runtime=figure_minutes,
     params:
         library=lambda wildcards: library(calibrated.module_of(wildcards.figure)),
         title=lambda wildcards: calibration_of(wildcards).model.title,

@@ -4,6 +4,7 @@ import atexit
 import os
 import time
 from dataclasses import replace
+from functools import cache
 
 from filtercake.calibration.config import (
     candidates as calibration_candidates,
@@ -16,13 +17,13 @@ from filtercake.figures import calibrated, catalogue
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST, count_kept, point_key
 from filtercake.packing.result import read_record
-from filtercake.run import console
+from filtercake.run import console, slurm
 from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.run.provenance import code_hash, packing_code, sources
 from filtercake.study import engine_choice, estimate
 from filtercake.study.loading import find_studies, load_studies
 from filtercake.study.points import expand as expand_points, with_engine
-from filtercake.units import MICROMETRE
+from filtercake.units import MICROMETRE, MINUTE
 from filtercake.validation.stability import families as stress_families
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
@@ -153,16 +154,56 @@ def packed_csd(wildcards):
     return study_of(wildcards).csds[point_of(wildcards).csd].truncated
 
 
-def packing_minutes(wildcards, attempt):
-    """Walltime from measured run times; doubled on every retry."""
-    return estimate.walltime_minutes(
-        point_of(wildcards), packed_csd(wildcards), attempt
+def is_slurm():
+    """Whether this process submits to Slurm; known once all rules are read."""
+    return getattr(workflow.executor_plugin, "name", None) == "slurm"
+
+
+@cache
+def partitions():
+    return slurm.partitions() if is_slurm() else []
+
+
+@cache
+def partition():
+    """The partition that packings are submitted to; None where it is not known, or there is no cluster."""
+    asked = {
+        **(workflow.resource_settings.default_resources or {}),
+        **workflow.resource_settings.overwrite_resources.get("packing", {}),
+    }.get("slurm_partition")
+    return slurm.partition_of(
+        None if asked is None else str(getattr(asked, "value", asked)), partitions()
     )
+
+
+def granted_minutes():
+    """Longest walltime of a submission."""
+    limit = partition() and partition().longest_minutes
+    return min(limit or estimate.LONGEST_MINUTES, estimate.LONGEST_MINUTES)
+
+
+def packing_minutes(wildcards, attempt):
+    """Walltime from measured run times; doubled on every retry, within what is granted."""
+    return estimate.walltime_minutes(
+        point_of(wildcards),
+        packed_csd(wildcards),
+        attempt,
+        granted=granted_minutes(),
+    )
+
+
+def figure_minutes(wildcards):
+    """Walltime of a figure: those of all studies may share a submission."""
+    together = workflow.group_settings.group_components.get("figures", 1)
+    together = min(together, 12 * (len(STUDIES) + len(CALIBRATIONS)))
+    return max(1, min(15, granted_minutes() // together))
 
 
 def packing_group(wildcards):
     """Name of the submissions that short points share on a cluster; the profile says how many."""
-    size = estimate.group_size(point_of(wildcards), packed_csd(wildcards))
+    size = estimate.group_size(
+        point_of(wildcards), packed_csd(wildcards), granted=granted_minutes()
+    )
     return f"packing_{size}" if size > 1 else None
 
 
@@ -214,6 +255,20 @@ def cost_of(points_by_study, missing):
     )
 
 
+def too_long():
+    """Say which points are expected to take longer than their partition grants."""
+    seconds = [
+        estimate.job_seconds(point, KNOWN[study].csds[point.csd].truncated)
+        for study, points in points_to_make().items()
+        for point in points.values()
+    ]
+    late = [item for item in seconds if item > MINUTE * granted_minutes()]
+    if late and partition():
+        text = slurm.too_long(partition(), partitions(), len(late), max(late))
+        return [f"warning: {text}"]
+    return []
+
+
 def announcement():
     """The plan of the run, and the number of packings in it."""
     to_make = points_to_make()
@@ -221,7 +276,7 @@ def announcement():
         study: {name: missing_packings(study, point) for name, point in points.items()}
         for study, points in to_make.items()
     }
-    lines = []
+    lines = too_long()
     for name in points_of_run():
         lines += [f"warning: {warning}" for warning in KNOWN[name].warnings]
     if points_of_run():
@@ -253,6 +308,10 @@ def begin_run():
         )
     if text:
         print(text, file=sys.stderr)
+    if is_slurm():
+        slurm.watch(
+            Path.cwd().resolve(), lambda line: print(line, file=sys.stderr, flush=True)
+        )
 
 
 def announce_dry_run():

@@ -29,7 +29,7 @@ rule figure:
         "../envs/filtercake.yaml"
     resources:
         mem_mb=2000,
-        runtime=15,
+        runtime=figure_minutes,
     params:
         library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
         study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),

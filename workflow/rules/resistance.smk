@@ -37,7 +37,7 @@ rule replicates:
         "../envs/filtercake.yaml"
     resources:
         mem_mb=2000,
-        runtime=30,
+        runtime=lambda wildcards: min(30, granted_minutes()),
     params:
         library=library("results.replicates"),
         points=point_rows,

@@ -165,11 +165,16 @@ def job_seconds(point: Point, csd: CrystalSizeDistribution, start: float = START
     return start + packings_of(point) * packing_seconds(point.spec, csd) / parallelism(point.spec)
 
 
-def walltime_minutes(point: Point, csd: CrystalSizeDistribution, attempt: int = 1) -> int:
-    """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry."""
+def walltime_minutes(
+    point: Point, csd: CrystalSizeDistribution, attempt: int = 1, *, granted: int = LONGEST_MINUTES
+) -> int:
+    """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry.
+
+    A submission, in which other points may wait for this one, asks for no more than is ``granted`` (min).
+    """
     most = point.most_replicates * packing_seconds(point.spec, csd) / parallelism(point.spec)
     first = math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
-    return min(LONGEST_MINUTES, first << (attempt - 1))
+    return min(first << (attempt - 1), granted // group_size(point, csd, granted=granted))
 
 
 def memory_mb(spec: PackingSpec) -> int:
@@ -177,12 +182,16 @@ def memory_mb(spec: PackingSpec) -> int:
     return math.ceil(BASE_MB + SPHERE_MB * spec.particles)
 
 
-def group_size(point: Point, csd: CrystalSizeDistribution) -> int:
-    """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one."""
+def group_size(point: Point, csd: CrystalSizeDistribution, *, granted: int = LONGEST_MINUTES) -> int:
+    """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one.
+
+    The estimates of all of them, with room, stay within the walltime that is ``granted`` (min).
+    """
     if parallelism(point.spec) > 1:
         return 1
     minutes = job_seconds(point, csd, START_SECONDS + NODE_SECONDS) / MINUTE
-    return next((size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES), 1)
+    most = min(SUBMISSION_MINUTES, granted / WALLTIME_FACTOR)
+    return next((size for size in GROUP_SIZES if size * minutes <= most), 1)
 
 
 def estimate(points: Iterable[Point], csds: Csds, *, on_cluster: bool = False) -> Estimate:
