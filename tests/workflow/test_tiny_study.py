@@ -116,6 +116,13 @@ def test_a_new_value_in_the_study_makes_only_the_new_points(finished):
     assert set(planned) - {"all"} == {"packing", "points", *AFTER_PACKING}
 
 
+def test_a_plan_counts_what_is_made_not_what_is_kept(finished):
+    study = finished.root / "config/test/tiny.yaml"
+    with edited(study, lambda text: text.replace("replicates: 2", "replicates: 3")):
+        done = finished.run("--dry-run")
+    assert "tiny: 5 of 5 points, 5 packings to make with" in done.stderr
+
+
 def test_a_label_in_the_study_makes_no_packing(finished):
     study = finished.root / "config/test/tiny.yaml"
     with edited(study, lambda text: text.replace("50/50 wt% 30/50 um", "another label")):

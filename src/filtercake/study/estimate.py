@@ -172,9 +172,13 @@ def walltime_minutes(
 
     A submission, in which other points may wait for this one, asks for no more than is ``granted`` (min).
     """
+    longest = granted // group_size(point, csd, granted=granted)
+    return min(_first_walltime(point, csd) << (attempt - 1), longest)
+
+
+def _first_walltime(point: Point, csd: CrystalSizeDistribution) -> int:
     most = point.most_replicates * packing_seconds(point.spec, csd) / parallelism(point.spec)
-    first = math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
-    return min(first << (attempt - 1), granted // group_size(point, csd, granted=granted))
+    return math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
 
 
 def memory_mb(spec: PackingSpec) -> int:
@@ -185,13 +189,14 @@ def memory_mb(spec: PackingSpec) -> int:
 def group_size(point: Point, csd: CrystalSizeDistribution, *, granted: int = LONGEST_MINUTES) -> int:
     """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one.
 
-    The estimates of all of them, with room, stay within the walltime that is ``granted`` (min).
+    The walltimes of all of them together stay within what is ``granted`` (min).
     """
     if parallelism(point.spec) > 1:
         return 1
     minutes = job_seconds(point, csd, START_SECONDS + NODE_SECONDS) / MINUTE
-    most = min(SUBMISSION_MINUTES, granted / WALLTIME_FACTOR)
-    return next((size for size in GROUP_SIZES if size * minutes <= most), 1)
+    walltime = _first_walltime(point, csd)
+    fitting = (size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES and size * walltime <= granted)
+    return next(fitting, 1)
 
 
 def estimate(points: Iterable[Point], csds: Csds, *, on_cluster: bool = False) -> Estimate:
