@@ -9,6 +9,9 @@ SEED ?= 1
 BIN := $(VENV)/bin
 PLACE := $(if $(PROFILE),--workflow-profile $(PROFILE),--cores $(CORES))
 SNAKEMAKE := $(BIN)/snakemake $(PLACE)
+PYTEST := $(BIN)/pytest -n $(CORES)
+CHECKS := check-types check-style check-workflow
+SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs $(CORES) --output-sync --keep-going
 CONFIG := $(if $(STUDIES),--config studies=$(STUDIES))
 # calibrations that have been made; the report takes in those of its studies
 MADE := $(patsubst results/calibration_%/calibration.json,%,$(wildcard results/calibration_*/calibration.json))
@@ -39,7 +42,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
 $(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
-.PHONY: run report browser benchmark stability pages faults reference calibrate test test-all slurm-test lint format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -50,26 +53,39 @@ setup: ## create the environment; install LIGGGHTS where possible
 run: setup ## run the studies of config/config.yaml (STUDIES=a,b for others; PROFILE=slurm on a cluster)
 	$(SNAKEMAKE) $(CONFIG)
 
-test: setup lint ## lint, type-check and run the fast tests
-	$(BIN)/pytest
+test: setup ## lint, type-check and run the fast tests
+	@$(SIDE_BY_SIDE) $(CHECKS) kernels
+	$(PYTEST)
 
 browser: setup ## the report in headless Chromium (installs Debian's chromium where it is missing)
 	@command -v chromium >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium; }
 	$(BIN)/pytest -m browser
 
-test-all: setup lint ## every test, slow ones too (but make browser, make slurm-test, make faults)
-	$(BIN)/pytest -m "not slurm and not browser and not faults"
+test-all: setup ## every test, slow ones too (but make browser, make slurm-test, make faults)
+	@$(SIDE_BY_SIDE) $(CHECKS) kernels
+	$(PYTEST) -m "not slurm and not browser and not faults"
 
 slurm-test: setup ## the workflow on a private two-node Slurm (Debian's slurm-wlm is installed where root allows)
 	@workflow/envs/slurm.sh
 	$(BIN)/pytest tests/slurm -m slurm
 
 lint: setup ## ruff, mypy --strict, snakefmt, snakemake --lint
+	@$(SIDE_BY_SIDE) $(CHECKS)
+
+check-types:
+	$(BIN)/mypy
+
+check-style:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+
+check-workflow:
 	$(BIN)/snakefmt --check --compact-diff Snakefile workflow
 	$(BIN)/snakemake --lint
+
+# compiled once here, not by each process of tests
+kernels:
+	$(BIN)/python tests/compile_kernels.py
 
 format: setup ## format the code
 	$(BIN)/ruff check --fix .

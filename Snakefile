@@ -19,8 +19,12 @@ include: "workflow/rules/resistance.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/common_calibration.smk"
 include: "workflow/rules/calibration.smk"
-include: "workflow/rules/benchmark.smk"
 include: "workflow/rules/report.smk"
+
+
+if validation_is_asked():
+
+    include: "workflow/rules/validation.smk"
 
 
 rule all:

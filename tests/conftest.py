@@ -14,11 +14,10 @@ from hypothesis import settings
 from scipy.special import gammainc
 
 from filtercake.crystals.csd import CrystalSizeDistribution, Truncation, discretise, mixture, truncate
-from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines.liggghts import find_executable
 from filtercake.packing.result import SettledState
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import StopRule, Trajectory
 from filtercake.study.loading import LoadedStudy, load_study
 
@@ -29,6 +28,13 @@ UM = 1e-6
 
 ALUM_G_TAU = {15: 58.417e-6, 30: 67.103e-6, 45: 72.771e-6, 60: 77.081e-6}
 """Growth rate times residence time (m) of the ammonium alum crystallizer by residence time (min)."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the tests of a file in one of several processes, so that what they share is made once."""
+    for item in items:
+        if item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @pytest.fixture
@@ -66,9 +72,10 @@ def alum() -> Callable[[int], tuple[CrystalSizeDistribution, Truncation]]:
 
 
 @pytest.fixture(scope="session")
-def make_spec() -> Callable[..., PackingSpec]:
-    """A spec of PMMA at the paper's values; keywords replace some of them."""
-    base = PackingSpec(
+def make_scene() -> Callable[..., Scene]:
+    """A scene of half 30 um, half 50 um PMMA at the paper's values; keywords replace some of them."""
+    base = Scene(
+        csd=mixture([30 * UM, 50 * UM], [0.5, 0.5]),
         particles=300,
         initial_void_fraction=0.65,
         settling_velocity=0.01,
@@ -78,9 +85,9 @@ def make_spec() -> Callable[..., PackingSpec]:
         restitution=0.3,
         friction=0.0,
         cohesion=50e3,
-        time_step=0.36 * contact_law.rayleigh_time_step(15 * UM, 1180.0, 5e6, 0.2),
+        time_step=0.0,
         engine="liggghts",
-    )
+    ).with_time_step(0.36)
     return lambda **changes: dataclasses.replace(base, **changes)
 
 
@@ -103,8 +110,8 @@ def calm_trajectory(height: float, checks: int = 30) -> Trajectory:
 
 
 @pytest.fixture
-def settled_lattice(make_spec: Callable[..., PackingSpec]) -> SimpleNamespace:
-    """A bed that must be accepted: a simple cubic lattice at rest, with its spec, cloud and stop rule.
+def settled_lattice(make_scene: Callable[..., Scene]) -> SimpleNamespace:
+    """A bed that must be accepted: a simple cubic lattice at rest, with its scene, cloud and stop rule.
 
     Six layers of 5 x 5 spheres of 40 um that just touch one another and the floor: N = 150, L = 200 um.
     """
@@ -115,7 +122,7 @@ def settled_lattice(make_spec: Callable[..., PackingSpec]) -> SimpleNamespace:
     n = len(position)
     radii = np.full(n, radius)
     cloud = Cloud(position, radii, length, 2.0 * length)
-    spec = make_spec(particles=n)
+    scene = make_scene(particles=n)
     rule = StopRule(check_steps=100, max_checks=160, height_tolerance=1e-4 / 0.65)
     state = SettledState(
         position=position.copy(),
@@ -129,7 +136,7 @@ def settled_lattice(make_spec: Callable[..., PackingSpec]) -> SimpleNamespace:
         engine="liggghts",
         engine_version="test",
     )
-    return SimpleNamespace(state=state, spec=spec, cloud=cloud, rule=rule)
+    return SimpleNamespace(state=state, scene=scene, cloud=cloud, rule=rule)
 
 
 STUDY = """\

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,12 +18,18 @@ _SHORT.maxstring = _SHORT.maxother = LONGEST_SHOWN
 
 
 def shown(value: Any) -> str:
-    """Show a value in a message, shortened, however large or deep a file makes it."""
+    """Text of a value for a message, shortened however large or deep it is."""
     try:
         text = _SHORT.repr(value)
     except ValueError:  # an int of more digits than Python writes
         return "(a number of very many digits)"
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """End of a message that proposes the known word nearest to the one given; empty where none is near."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f"; did you mean {close[0]}?" if close else ""
 
 
 def visible(text: str) -> str:
@@ -42,7 +49,7 @@ class FiltercakeError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong with one input.
+    """One invalid value of an input.
 
     Attributes
     ----------
@@ -53,7 +60,7 @@ class Problem:
     value : str
         The offending value as the user wrote it.
     allowed : str
-        What would be accepted instead.
+        Values that are accepted.
     """
 
     file: str
@@ -67,7 +74,7 @@ class Problem:
 
 
 class ConfigError(FiltercakeError):
-    """The configuration is wrong; holds every problem found, and lists the first ``MOST_SHOWN``."""
+    """The configuration is invalid; holds every problem found and lists the first ``MOST_SHOWN``."""
 
     def __init__(self, problems: Sequence[Problem]):
         self.problems = tuple(problems)

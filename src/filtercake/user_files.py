@@ -1,4 +1,4 @@
-"""Read a user's files without trusting them: regular files of bounded size, UTF-8, YAML without surprises."""
+"""Read files and templates that users may edit: regular files of bounded size, UTF-8, YAML without surprises."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import stat
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
+import jinja2
 import yaml
 
 from filtercake.errors import ConfigError, FiltercakeError, Problem, shown
@@ -75,6 +76,18 @@ def read_yaml(path: Path) -> Any:
         raise _problem(path, "(file)", "not valid YAML: nested too deeply") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise _problem(path, "(file)", f"not valid YAML: {' '.join(str(error).split())}") from None
+
+
+def templates(folder: Path, *, html: bool = False) -> jinja2.Environment:
+    """Return the templates of a folder, in which a name without a value is an error; values in HTML are escaped."""
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folder),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=not html,
+        autoescape=html,
+    )
 
 
 def _problem(path: Path, where: str, allowed: str) -> ConfigError:

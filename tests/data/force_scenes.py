@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from filtercake.crystals.csd import mixture
+from filtercake.packing import scene as packing
 from filtercake.packing.engines.liggghts import contact_model, find_executable, render
-from filtercake.packing.scene import PackingSpec
 
 REFERENCES = Path(__file__).with_name("force_references.npz")
 LENGTH_UM = 600.0
@@ -32,8 +33,9 @@ class Scene:
     steps: int = 2000
     time_step_us: float = 0.1
 
-    def spec(self):
-        return PackingSpec(
+    def packed(self):
+        return packing.Scene(
+            csd=mixture([20e-6], [1.0]),
             particles=len(self.radius),
             initial_void_fraction=0.65,
             settling_velocity=0.01,

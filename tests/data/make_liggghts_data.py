@@ -20,7 +20,7 @@ from filtercake.packing.cloud import make_cloud
 from filtercake.packing.engines import liggghts
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import StopRule
 
 DATA = Path(__file__).resolve().parent / "liggghts"
@@ -30,10 +30,10 @@ def request(folder: Path, checks: int, check_steps: int = 400) -> SettleRequest:
     """Sixty spheres of 30 and 50 um."""
     csd = mixture([30e-6, 50e-6], [0.5, 0.5])
     step = 0.36 * contact_law.rayleigh_time_step(15e-6, 1180.0, 5e6, 0.2)
-    spec = PackingSpec(60, 0.75, 0.01, 1180.0, 5e6, 0.2, 0.3, 0.0, 50e3, step, "liggghts")
-    cloud = make_cloud(csd, spec.particles, spec.initial_void_fraction, 1)
-    rule = dataclasses.replace(StopRule.for_bed(spec, cloud.length), max_checks=checks, check_steps=check_steps)
-    return SettleRequest(spec, csd, cloud, rule, 1, folder, print)
+    scene = Scene(csd, 60, 0.75, 0.01, 1180.0, 5e6, 0.2, 0.3, 0.0, 50e3, step, "liggghts")
+    cloud = make_cloud(csd, scene.particles, scene.initial_void_fraction, 1)
+    rule = dataclasses.replace(StopRule.for_bed(scene, cloud.length), max_checks=checks, check_steps=check_steps)
+    return SettleRequest(scene, cloud, rule, 1, folder, print)
 
 
 def short_run() -> None:
@@ -84,7 +84,7 @@ def as_published() -> None:
     """Keep the first kilobytes of the as-published protocol's output, up to what its insertion says."""
     with tempfile.TemporaryDirectory() as name:
         asked = request(Path(name), checks=1)
-        asked = dataclasses.replace(asked, spec=dataclasses.replace(asked.spec, time_limit=2.0))
+        asked = dataclasses.replace(asked, scene=dataclasses.replace(asked.scene, time_limit=2.0))
         with contextlib.suppress(EngineError):
             LiggghtsAsPublished().settle(asked)
         lines = (Path(name) / "screen.log").read_text(encoding="utf-8").splitlines(keepends=True)

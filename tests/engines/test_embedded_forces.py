@@ -23,7 +23,7 @@ def trajectory(scene):
         np.array(scene.velocity),
         np.array(scene.radius) * 1e-6,
         LENGTH_UM * 1e-6,
-        scene.spec(),
+        scene.packed(),
         gravity=scene.gravity,
     )
     bed.spin[:] = np.array(scene.spins()) * 1e6

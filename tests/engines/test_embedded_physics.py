@@ -14,17 +14,19 @@ from filtercake.packing.contacts import find_contacts
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.embedded import Bed, Embedded
 from filtercake.packing.pack import pack
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import StopRule
 
 RADIUS = 10e-6
 LENGTH = 600e-6
 HIGH = 300e-6
+CSD = mixture([20e-6, 50e-6], [0.5, 0.5])
 MODULUS = contact_law.effective_modulus(5e6, 0.2)
 
 
-def spec(**changes):
+def make(**changes):
     values = {
+        "csd": CSD,
         "particles": 2,
         "initial_void_fraction": 0.65,
         "settling_velocity": 0.01,
@@ -37,7 +39,7 @@ def spec(**changes):
         "time_step": 0.02e-6,
         "engine": "embedded",
     }
-    return PackingSpec(**{**values, **changes})
+    return Scene(**{**values, **changes})
 
 
 def pair(gap, speed, scene):
@@ -56,7 +58,7 @@ def opening(bed):
 
 @pytest.mark.parametrize("restitution", [0.1, 0.3, 0.6, 0.9])
 def test_restitution_of_a_collision(restitution):
-    bed = pair(0.1e-6, 0.1, spec(restitution=restitution, time_step=0.005e-6))
+    bed = pair(0.1e-6, 0.1, make(restitution=restitution, time_step=0.005e-6))
     bed.advance(16_000)
     gap, speed = opening(bed)
     assert gap > 0.0
@@ -64,7 +66,7 @@ def test_restitution_of_a_collision(restitution):
 
 
 def test_pairs_come_to_rest_at_the_equilibrium_overlap():
-    bed = pair(-0.01e-6, 0.0, spec(cohesion=50e3, time_step=0.1e-6))
+    bed = pair(-0.01e-6, 0.0, make(cohesion=50e3, time_step=0.1e-6))
     bed.advance(20_000)
     gap, speed = opening(bed)
     # the closed form takes 2 pi R* d for the lens; at 0.2 % overlap that is good to about as much
@@ -77,7 +79,7 @@ def test_escape_speed_of_a_cohesive_pair(factor, escapes):
     cohesion, density = 100e3, 1180.0
     escape = math.sqrt(37.0 * cohesion**5 / (density * MODULUS**4))
     overlap = contact_law.equilibrium_overlap(cohesion, 5e6, 0.2, RADIUS, RADIUS)
-    bed = pair(-overlap, -factor * escape, spec(cohesion=cohesion, restitution=0.9999))
+    bed = pair(-overlap, -factor * escape, make(cohesion=cohesion, restitution=0.9999))
     bed.advance(40_000)
     gap, _ = opening(bed)
     assert (gap > 0.0) == escapes
@@ -88,7 +90,7 @@ def test_pull_off_force_is_the_largest_attraction():
     strongest = 0.0
     for share in np.linspace(0.3, 0.6, 31):
         overlap = share * contact_law.equilibrium_overlap(cohesion, 5e6, 0.2, RADIUS, RADIUS)
-        bed = pair(-overlap, 0.0, spec(cohesion=cohesion))
+        bed = pair(-overlap, 0.0, make(cohesion=cohesion))
         bed.advance(0)
         strongest = max(strongest, bed.force[0, np.argsort(bed.identity)[0], 0])
     assert strongest == pytest.approx(contact_law.pull_off_force(cohesion, 5e6, 0.2, RADIUS, RADIUS), rel=0.01)
@@ -108,7 +110,7 @@ def cluster(n=60, seed=5, friction=0.0, cohesion=50e3, gravity=0.0, shift=0.0):
     centre = position.mean(axis=0)
     velocity = 0.1 * (centre - position) / np.linalg.norm(centre - position, axis=1)[:, None]
     position[:, 0] = (position[:, 0] + shift) % LENGTH
-    scene = spec(friction=friction, cohesion=cohesion, time_step=0.1e-6)
+    scene = make(friction=friction, cohesion=cohesion, time_step=0.1e-6)
     return Bed(position, velocity, radius, LENGTH, scene, gravity=gravity)
 
 
@@ -145,9 +147,8 @@ def energy(bed, gravity):
 
 
 def test_energy_only_falls():
-    csd = mixture([20e-6, 50e-6], [0.5, 0.5])
-    scene = spec(particles=300, time_step=0.1e-6)
-    bed = Bed.from_cloud(make_cloud(csd, 300, 0.65, 1), scene)
+    scene = make(particles=300, time_step=0.1e-6)
+    bed = Bed.from_cloud(make_cloud(CSD, 300, 0.65, 1), scene)
     record = []
     for _ in range(60):
         bed.advance(1500)
@@ -169,10 +170,9 @@ def test_periodic_images_are_equal(friction):
 
 
 def test_two_threads_agree_with_one():
-    csd = mixture([20e-6, 50e-6], [0.5, 0.5])
-    cloud = make_cloud(csd, 500, 0.65, 1)
+    cloud = make_cloud(CSD, 500, 0.65, 1)
     for friction in (0.0, 0.3):
-        scene = spec(particles=500, cohesion=50e3, friction=friction, time_step=0.1e-6)
+        scene = make(particles=500, cohesion=50e3, friction=friction, time_step=0.1e-6)
         one, two = Bed.from_cloud(cloud, scene), Bed.from_cloud(cloud, scene, threads=2)
         for bed in (one, two):
             bed.advance(16_000)
@@ -183,12 +183,12 @@ def test_two_threads_agree_with_one():
 
 def settle(cloud, scene):
     rule = StopRule.for_bed(scene, cloud.length)
-    return Embedded().settle(SettleRequest(scene, None, cloud, rule, 1, None, lambda _: None)), rule
+    return Embedded().settle(SettleRequest(scene, cloud, rule, 1, None, lambda _: None)), rule
 
 
 def test_one_sphere_comes_to_rest_on_the_floor():
     cloud = Cloud(np.array([[50e-6, 50e-6, 60e-6]]), np.array([RADIUS]), 100e-6, 200e-6)
-    state, rule = settle(cloud, spec(particles=1, cohesion=50e3, time_step=0.1e-6))
+    state, rule = settle(cloud, make(particles=1, cohesion=50e3, time_step=0.1e-6))
     assert rule.settled_at(state.trajectory) is not None
     resting = RADIUS - contact_law.equilibrium_overlap(50e3, 5e6, 0.2, RADIUS, math.inf)
     assert state.position[0, 2] == pytest.approx(resting, rel=1e-3)
@@ -197,7 +197,7 @@ def test_one_sphere_comes_to_rest_on_the_floor():
 def test_two_touching_spheres_stand_on_each_other_or_fall_over():
     position = np.array([[50e-6, 50e-6, RADIUS], [50e-6, 50e-6, 3.0 * RADIUS]])
     cloud = Cloud(position, np.full(2, RADIUS), 100e-6, 200e-6)
-    state, rule = settle(cloud, spec(cohesion=50e3, time_step=0.1e-6))
+    state, rule = settle(cloud, make(cohesion=50e3, time_step=0.1e-6))
     assert rule.settled_at(state.trajectory) is not None
     assert np.linalg.norm(state.position[1] - state.position[0]) == pytest.approx(2.0 * RADIUS, rel=0.01)
 
@@ -205,22 +205,21 @@ def test_two_touching_spheres_stand_on_each_other_or_fall_over():
 def test_spheres_as_wide_as_the_box_pile_up():
     position = np.array([[0.0, 0.0, 11e-6], [5e-6, 5e-6, 40e-6], [10e-6, 3e-6, 70e-6]])
     cloud = Cloud(position, np.full(3, RADIUS), 2.0 * RADIUS, 80e-6)
-    state, rule = settle(cloud, spec(particles=3, time_step=0.1e-6))
+    state, rule = settle(cloud, make(particles=3, time_step=0.1e-6))
     assert rule.settled_at(state.trajectory) is not None
     # each lies in a hollow of the layer below: one sphere per layer of a square lattice
     assert np.sort(state.position[:, 2]) == pytest.approx(RADIUS * (1.0 + math.sqrt(2.0) * np.arange(3)), rel=0.01)
 
 
 def test_without_gravity_nothing_moves():
-    bed = pair(1e-6, 0.0, spec())
+    bed = pair(1e-6, 0.0, make())
     bed.advance(10_000)
     assert opening(bed) == (pytest.approx(1e-6), 0.0)
 
 
 def test_a_far_too_long_time_step_is_refused(tmp_path):
-    csd = mixture([20e-6, 50e-6], [0.5, 0.5])
     with pytest.raises((EngineError, PackingRejected)) as refusal:
-        pack(spec(particles=300, cohesion=50e3, time_step=2.5e-6), csd, 0, tmp_path)
+        pack(make(particles=300, cohesion=50e3, time_step=2.5e-6), 0, tmp_path)
     assert any(word in str(refusal.value) for word in ("exploded", "time step"))
 
 
@@ -238,15 +237,14 @@ def test_no_engine_sees_a_bad_cloud(cloud):
 
 def test_a_bed_too_small_to_measure_is_refused_with_a_reason(tmp_path):
     with pytest.raises(PackingRejected, match="too shallow"):
-        pack(spec(particles=30, time_step=0.2e-6), mixture([20e-6, 50e-6], [0.5, 0.5]), 0, tmp_path)
+        pack(make(particles=30, time_step=0.2e-6), 0, tmp_path)
 
 
 def test_same_seed_same_packing(tmp_path):
-    csd = mixture([30e-6, 50e-6], [0.5, 0.5])
-    scene = spec(particles=300, cohesion=50e3, time_step=0.4e-6)
-    first, again = (pack(scene, csd, 0, tmp_path) for _ in range(2))
+    scene = make(csd=mixture([30e-6, 50e-6], [0.5, 0.5]), particles=300, cohesion=50e3, time_step=0.4e-6)
+    first, again = (pack(scene, 0, tmp_path) for _ in range(2))
     assert np.array_equal(first.position, again.position)
-    other = pack(replace(scene, seed=2), csd, 0, tmp_path)
+    other = pack(replace(scene, seed=2), 0, tmp_path)
     assert not np.array_equal(first.position, other.position)
 
 
@@ -266,7 +264,7 @@ def test_no_contact_is_missed_between_two_choices_of_near_pairs(friction):
     position = np.vstack([position, bullet])
     velocity = np.zeros_like(position)
     velocity[-1, 2] = speed
-    scene = spec(particles=len(position), time_step=step, skin=18e-6, friction=friction, restitution=0.9)
+    scene = make(particles=len(position), time_step=step, skin=18e-6, friction=friction, restitution=0.9)
     at_once, one_by_one = (
         Bed(position, velocity, np.full(len(position), RADIUS), LENGTH, scene, gravity=0.0) for _ in range(2)
     )

@@ -13,11 +13,12 @@ from filtercake.packing.engines import embedded
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.embedded_bed import Bed
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import StopRule
 
 CSD = mixture([20e-6, 50e-6], [0.5, 0.5])
-SPEC = PackingSpec(
+SCENE = Scene(
+    csd=CSD,
     particles=400,
     initial_void_fraction=0.65,
     settling_velocity=0.01,
@@ -32,11 +33,11 @@ SPEC = PackingSpec(
 )
 
 
-def all_awake(cloud, spec):
+def all_awake(cloud, scene):
     """The same cloud with every sphere in the bed from the start: nothing is left out."""
     velocity = np.zeros_like(cloud.position)
-    velocity[:, 2] = -spec.settling_velocity
-    return Bed(cloud.position, velocity, cloud.radius, cloud.length, spec)
+    velocity[:, 2] = -scene.settling_velocity
+    return Bed(cloud.position, velocity, cloud.radius, cloud.length, scene)
 
 
 def apart(one, other):
@@ -53,9 +54,9 @@ def apart(one, other):
     [(0.01, 12_000), (0.5, 1500), (2.0, 500)],
 )
 def test_free_fall_left_out_changes_nothing(speed, steps, friction):
-    spec = replace(SPEC, settling_velocity=speed, time_step=0.05e-6 if speed > 0.1 else 0.1e-6, friction=friction)
-    cloud = make_cloud(CSD, spec.particles, spec.initial_void_fraction, 1)
-    lazy, eager = Bed.from_cloud(cloud, spec), all_awake(cloud, spec)
+    scene = replace(SCENE, settling_velocity=speed, time_step=0.05e-6 if speed > 0.1 else 0.1e-6, friction=friction)
+    cloud = make_cloud(CSD, scene.particles, scene.initial_void_fraction, 1)
+    lazy, eager = Bed.from_cloud(cloud, scene), all_awake(cloud, scene)
     for bed in (lazy, eager):
         bed.advance(steps)
     assert 60 < lazy.down < lazy.count < lazy.total  # some landed, some near, some far: all three kinds are there
@@ -68,8 +69,8 @@ def test_a_chain_of_spheres_wakes_upwards():
     height = radius + 2e-6 + np.arange(n) * (2.0 * radius + 1e-9)
     lean = 0.05 * radius * np.arange(n) % (0.3 * radius)
     cloud = Cloud(np.column_stack([50e-6 + lean, np.full(n, 50e-6), height]), np.full(n, radius), 100e-6, 400e-6)
-    spec = replace(SPEC, settling_velocity=0.3, time_step=0.05e-6)
-    lazy, eager = Bed.from_cloud(cloud, spec), all_awake(cloud, spec)
+    scene = replace(SCENE, settling_velocity=0.3, time_step=0.05e-6)
+    lazy, eager = Bed.from_cloud(cloud, scene), all_awake(cloud, scene)
     for bed in (lazy, eager):
         bed.advance(600)
     assert lazy.down > 3
@@ -78,8 +79,8 @@ def test_a_chain_of_spheres_wakes_upwards():
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_the_neighbour_skin_changes_nothing(friction):
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
-    beds = [Bed.from_cloud(cloud, replace(SPEC, friction=friction, skin=skin)) for skin in (0.4e-6, 3e-6, 30e-6)]
+    cloud = make_cloud(CSD, SCENE.particles, SCENE.initial_void_fraction, 1)
+    beds = [Bed.from_cloud(cloud, replace(SCENE, friction=friction, skin=skin)) for skin in (0.4e-6, 3e-6, 30e-6)]
     for bed in beds:
         bed.advance(12_000)
     assert beds[0].down > 60
@@ -87,8 +88,8 @@ def test_the_neighbour_skin_changes_nothing(friction):
 
 
 def test_a_bed_costs_pairs_only_where_it_lies():
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
-    bed = Bed.from_cloud(cloud, SPEC)
+    cloud = make_cloud(CSD, SCENE.particles, SCENE.initial_void_fraction, 1)
+    bed = Bed.from_cloud(cloud, SCENE)
     bed.advance(12_000)
     # a quarter of the fall: most spheres are still on their parabola
     assert bed.count < 0.6 * bed.total
@@ -98,16 +99,16 @@ class Killed(BaseException):
     """Like a signal: not an error that anything catches."""
 
 
-def request(cloud, spec, folder, progress=lambda _line: None):
-    rule = StopRule.for_bed(spec, cloud.length)
-    return SettleRequest(spec, CSD, cloud, rule, 1, folder, progress, folder / "bed.state.npz")
+def request(cloud, scene, folder, progress=lambda _line: None):
+    rule = StopRule.for_bed(scene, cloud.length)
+    return SettleRequest(scene, cloud, rule, 1, folder, progress, folder / "bed.state.npz")
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_bed_killed_halfway_ends_as_one_that_was_not(tmp_path: Path, monkeypatch, friction):
-    spec = replace(SPEC, particles=200, friction=friction, time_step=0.15e-6)
-    cloud = make_cloud(CSD, spec.particles, spec.initial_void_fraction, 1)
-    undisturbed = Embedded().settle(request(cloud, spec, tmp_path))
+    scene = replace(SCENE, particles=200, friction=friction, time_step=0.15e-6)
+    cloud = make_cloud(CSD, scene.particles, scene.initial_void_fraction, 1)
+    undisturbed = Embedded().settle(request(cloud, scene, tmp_path))
     assert not list(tmp_path.glob("*"))  # a short packing saves nothing
     monkeypatch.setattr(embedded, "STATE_SECONDS", 0.0)
     monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.0)
@@ -123,8 +124,8 @@ def test_a_bed_killed_halfway_ends_as_one_that_was_not(tmp_path: Path, monkeypat
 
     for limit in (10, 22):  # twice
         with pytest.raises(Killed):
-            Embedded().settle(request(cloud, spec, tmp_path, kill_at_check(limit)))
-    state = Embedded().settle(request(cloud, spec, tmp_path, lines.append))
+            Embedded().settle(request(cloud, scene, tmp_path, kill_at_check(limit)))
+    state = Embedded().settle(request(cloud, scene, tmp_path, lines.append))
     assert sum("resumed at step" in line for line in lines) == 2
     assert np.array_equal(state.position, undisturbed.position)
     assert np.array_equal(state.velocity, undisturbed.velocity)
@@ -134,28 +135,28 @@ def test_a_bed_killed_halfway_ends_as_one_that_was_not(tmp_path: Path, monkeypat
 
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 cut short", b"not an archive"])
 def test_a_damaged_state_is_as_none(tmp_path: Path, damage):
-    spec = replace(SPEC, particles=60, time_step=0.25e-6)
-    cloud = make_cloud(CSD, spec.particles, spec.initial_void_fraction, 1)
-    undisturbed = Embedded().settle(request(cloud, spec, tmp_path))
+    scene = replace(SCENE, particles=60, time_step=0.25e-6)
+    cloud = make_cloud(CSD, scene.particles, scene.initial_void_fraction, 1)
+    undisturbed = Embedded().settle(request(cloud, scene, tmp_path))
     (tmp_path / "bed.state.npz").write_bytes(damage)
-    assert np.array_equal(Embedded().settle(request(cloud, spec, tmp_path)).position, undisturbed.position)
+    assert np.array_equal(Embedded().settle(request(cloud, scene, tmp_path)).position, undisturbed.position)
 
 
 def test_reports_say_how_many_are_down_and_when_it_ends(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.0)
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
+    cloud = make_cloud(CSD, SCENE.particles, SCENE.initial_void_fraction, 1)
     lines = []
-    Embedded().settle(request(cloud, replace(SPEC, time_step=0.25e-6), tmp_path, lines.append))
+    Embedded().settle(request(cloud, replace(SCENE, time_step=0.25e-6), tmp_path, lines.append))
     down = [int(re.search(r", ([\d,]+) of 400 spheres down, ", line).group(1).replace(",", "")) for line in lines]
     assert down == sorted(down)
-    assert down[-1] == SPEC.particles
+    assert down[-1] == SCENE.particles
     assert all(line.endswith(" left") for line in lines)
 
 
 def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, monkeypatch):
     clock = [0.0]
-    cloud = make_cloud(CSD, SPEC.particles, SPEC.initial_void_fraction, 1)
-    spec = replace(SPEC, time_step=0.25e-6)
+    cloud = make_cloud(CSD, SCENE.particles, SCENE.initial_void_fraction, 1)
+    scene = replace(SCENE, time_step=0.25e-6)
     advance = embedded.Bed.advance
     lines = []
 
@@ -166,7 +167,7 @@ def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, mon
     monkeypatch.setattr(embedded.time, "monotonic", lambda: clock[0])
     monkeypatch.setattr(embedded.Bed, "advance", timed)
     monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.5)
-    run = embedded._Run(request(cloud, spec, tmp_path, lines.append), embedded.Bed.from_cloud(cloud, spec, 1))
+    run = embedded._Run(request(cloud, scene, tmp_path, lines.append), embedded.Bed.from_cloud(cloud, scene, 1))
     run.settle()
     took = clock[0] - 1000.0  # a second a check
     forecasts = [re.search(r"about (\d+) (min|s) left", line).groups() for line in lines]

@@ -30,7 +30,7 @@ from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed, pack, pack_replicates
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, read_record
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import StopRule
 
 UM = 1e-6
@@ -39,21 +39,21 @@ needs_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun
 
 
 @pytest.fixture(scope="module")
-def spec(make_spec: Callable[..., PackingSpec]) -> PackingSpec:
+def scene(make_scene: Callable[..., Scene]) -> Scene:
     """A hundred spheres: the smallest bed with an interior, packed in less than a second."""
-    return make_spec(particles=100)
+    return make_scene(particles=100)
 
 
 @pytest.fixture
 def ask(tmp_path: Path, small_csd: CrystalSizeDistribution) -> Callable[..., SettleRequest]:
-    """Make a request for a spec, with a scratch folder of its own."""
+    """Make a request for a scene, with a scratch folder of its own."""
 
-    def make(spec: PackingSpec, seed: int = 1) -> SettleRequest:
-        cloud = make_cloud(small_csd, spec.particles, spec.initial_void_fraction, seed)
+    def make(scene: Scene, seed: int = 1) -> SettleRequest:
+        cloud = make_cloud(small_csd, scene.particles, scene.initial_void_fraction, seed)
         folder = tmp_path / "scratch"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
-        return SettleRequest(spec, small_csd, cloud, StopRule.for_bed(spec, cloud.length), seed, folder, lambda _: None)
+        return SettleRequest(scene, cloud, StopRule.for_bed(scene, cloud.length), seed, folder, lambda _: None)
 
     return make
 
@@ -121,16 +121,16 @@ def settling(folder: Path) -> bool:
 
 @pytest.fixture(scope="module")
 def packed(
-    make_spec: Callable[..., PackingSpec], small_csd: CrystalSizeDistribution, tmp_path_factory: pytest.TempPathFactory
+    make_scene: Callable[..., Scene], small_csd: CrystalSizeDistribution, tmp_path_factory: pytest.TempPathFactory
 ) -> Packing:
     """A packing of 300 spheres of 30 and 50 um."""
     if find_executable() is None:
         pytest.skip("LIGGGHTS is not installed")
-    return pack(make_spec(particles=300), small_csd, 0, tmp_path_factory.mktemp("packed"))
+    return pack(make_scene(particles=300), 0, tmp_path_factory.mktemp("packed"))
 
 
 @pytest.mark.liggghts
-def test_a_small_packing_is_accepted(packed: Packing, make_spec: Callable[..., PackingSpec]) -> None:
+def test_a_small_packing_is_accepted(packed: Packing, make_scene: Callable[..., Scene]) -> None:
     record = packed.diagnostics
     assert record["particles"] == 300
     assert record["settled"] is True
@@ -138,7 +138,7 @@ def test_a_small_packing_is_accepted(packed: Packing, make_spec: Callable[..., P
     assert record["engine"] == "liggghts"
     assert record["engine_version"].startswith("LIGGGHTS")
     # looser than random close packing of such a mixture (Farr and Groot: near 0.32), denser than loose packing (0.45)
-    assert 0.32 < measure(packed, make_spec()).interior < 0.45
+    assert 0.32 < measure(packed, make_scene()).interior < 0.45
     # overlaps near their equilibrium, 0.2 % for equal spheres and up to twice that for small on large
     assert 0.001 < record["overlap_mean"] < 0.004
     # a frictionless bed at rest is isostatic: 6 contacts per sphere, less the ones of rattlers and the open top
@@ -147,9 +147,9 @@ def test_a_small_packing_is_accepted(packed: Packing, make_spec: Callable[..., P
 
 @pytest.mark.liggghts
 def test_the_same_seed_gives_the_same_packing_to_the_last_bit(
-    packed: Packing, make_spec: Callable[..., PackingSpec], small_csd: CrystalSizeDistribution, tmp_path: Path
+    packed: Packing, make_scene: Callable[..., Scene], small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
-    again = pack(make_spec(particles=300), small_csd, 0, tmp_path)
+    again = pack(make_scene(particles=300), 0, tmp_path)
     assert np.array_equal(again.position, packed.position)
     assert np.array_equal(again.radius, packed.radius)
     assert again.diagnostics["steps"] == packed.diagnostics["steps"]
@@ -164,7 +164,7 @@ def test_the_spheres_stay_in_the_order_of_the_cloud(packed: Packing, small_csd: 
 
 @pytest.mark.liggghts
 def test_without_friction_the_tangential_part_is_exactly_nothing(
-    templates: Path, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    templates: Path, scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     # contact_distance_factor lists more pairs, so that forces are summed in another order: without it, all is equal
     spoil(templates, " contact_distance_factor 1.2", "")
@@ -172,43 +172,43 @@ def test_without_friction_the_tangential_part_is_exactly_nothing(
     for tangential in (False, True):
         folder = tmp_path / str(tangential)
         folder.mkdir()
-        made[tangential] = pack(spec, small_csd, 0, folder, engine=Liggghts(force_tangential=tangential))
+        made[tangential] = pack(scene, 0, folder, engine=Liggghts(force_tangential=tangential))
         assert ("tangential history" in (folder / "packing.in").read_text(encoding="utf-8")) == tangential
     assert np.array_equal(made[True].position, made[False].position)
-    assert measure(made[True], spec).interior == pytest.approx(measure(made[False], spec).interior, abs=1e-12)
+    assert measure(made[True], scene).interior == pytest.approx(measure(made[False], scene).interior, abs=1e-12)
 
 
 @pytest.mark.liggghts
 def test_without_friction_the_tangential_deck_differs_by_rounding_only(
-    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     porosity = []
     for tangential in (False, True):
         folder = tmp_path / str(tangential)
         folder.mkdir()
-        porosity.append(measure(pack(spec, small_csd, 0, folder, engine=Liggghts(force_tangential=tangential)), spec))
+        porosity.append(measure(pack(scene, 0, folder, engine=Liggghts(force_tangential=tangential)), scene))
     # rounding grows in a chaotic fall; 1e-10 seen with 100 spheres, 3e-7 with 300
     assert porosity[1].interior == pytest.approx(porosity[0].interior, abs=1e-5)
 
 
 @pytest.mark.liggghts
-def test_friction_makes_a_looser_bed(spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path) -> None:
+def test_friction_makes_a_looser_bed(scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path) -> None:
     porosity = []
     for friction in (0.0, 0.5):
         folder = tmp_path / str(friction)
         folder.mkdir()
-        rough = dataclasses.replace(spec, friction=friction, time_step=0.5 * spec.time_step)
-        porosity.append(measure(pack(rough, small_csd, 0, folder), rough).interior)
+        rough = dataclasses.replace(scene, friction=friction, time_step=0.5 * scene.time_step)
+        porosity.append(measure(pack(rough, 0, folder), rough).interior)
     assert porosity[1] > porosity[0] + 0.01
 
 
 @pytest.mark.liggghts
 @needs_mpirun
 def test_two_mpi_processes_agree(
-    packed: Packing, make_spec: Callable[..., PackingSpec], small_csd: CrystalSizeDistribution, tmp_path: Path
+    packed: Packing, make_scene: Callable[..., Scene], small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
-    two = make_spec(particles=300, processes=2)
-    made = pack(two, small_csd, 0, tmp_path)
+    two = make_scene(particles=300, processes=2)
+    made = pack(two, 0, tmp_path)
     assert "2 by 1 by 1 MPI processor grid" in (tmp_path / "screen.log").read_text(encoding="utf-8")
     assert made.diagnostics["particles"] == 300
     # another order of sums is another path of a chaotic fall: as close as two seeds of so small a bed are
@@ -216,10 +216,8 @@ def test_two_mpi_processes_agree(
 
 
 @pytest.mark.liggghts
-def test_pictures_are_kept_when_asked_for(
-    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
-) -> None:
-    (outcome,) = pack_replicates(dataclasses.replace(spec, write_vtk=True), small_csd, 1, tmp_path, "code")
+def test_pictures_are_kept_when_asked_for(scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path) -> None:
+    (outcome,) = pack_replicates(dataclasses.replace(scene, write_vtk=True), 1, tmp_path, "code")
     assert outcome.status == "ok", outcome.reason
     pictures = sorted((tmp_path / "r0.vtk").iterdir())
     assert len(pictures) >= 3
@@ -228,16 +226,16 @@ def test_pictures_are_kept_when_asked_for(
 
 @pytest.mark.liggghts
 def test_the_published_protocol_runs_and_is_accepted(
-    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     # a fifth of its steps is 13 ms of physical time, twice the fall of this small bed
-    scene = dataclasses.replace(spec, engine="liggghts_as_published")
-    made = pack(scene, small_csd, 0, tmp_path, engine=LiggghtsAsPublished(steps=30_000))
+    scene = dataclasses.replace(scene, engine="liggghts_as_published")
+    made = pack(scene, 0, tmp_path, engine=LiggghtsAsPublished(steps=30_000))
     assert made.diagnostics["engine"] == "liggghts_as_published"
     assert made.diagnostics["steps"] == 30_001  # one step inserts
     # it draws its own spheres, and LIGGGHTS inserts fewer than asked: 77 of 100 here
     assert 50 <= made.diagnostics["particles"] <= 110
-    assert 0.3 < measure(made, spec).interior < 0.5
+    assert 0.3 < measure(made, scene).interior < 0.5
 
 
 @pytest.mark.slow
@@ -246,12 +244,12 @@ def test_the_published_protocol_runs_and_is_accepted(
     ("friction", "cohesion", "published"), [(0.0, 50e3, 0.3604), (0.5, 0.0, 0.381)], ids=["smooth sticky", "rough dry"]
 )
 def test_pmma_gives_the_authors_porosity(
-    make_spec: Callable[..., PackingSpec], pmma: Any, tmp_path: Path, friction: float, cohesion: float, published: float
+    make_scene: Callable[..., Scene], pmma: Any, tmp_path: Path, friction: float, cohesion: float, published: float
 ) -> None:
     # physics.md, sections 5 and 6: 50/50 PMMA, N = 2000, whole spheres by centre; seed-to-seed sd 0.0037, 4 allowed
     step = 0.1e-6 if friction else 0.3e-6
-    spec = make_spec(particles=2000, friction=friction, cohesion=cohesion, time_step=step)
-    found = measure(pack(spec, pmma(0.5), 0, tmp_path), spec)
+    scene = make_scene(csd=pmma(0.5), particles=2000, friction=friction, cohesion=cohesion, time_step=step)
+    found = measure(pack(scene, 0, tmp_path), scene)
     assert found.paper_count == pytest.approx(published, abs=4 * 0.0037)
     if cohesion:
         assert found.from_floor == pytest.approx(0.3610, abs=4 * 0.0015)
@@ -269,8 +267,8 @@ def deck(request: SettleRequest, fake: Callable[[str], Path], engine: Liggghts |
     return (request.folder / "packing.in").read_text(encoding="utf-8")
 
 
-def test_a_smooth_dry_scene_computes_neither_friction_nor_cohesion(spec: PackingSpec, ask: Any, fake: Any) -> None:
-    text = deck(ask(dataclasses.replace(spec, friction=0.0, cohesion=0.0)), fake)
+def test_a_smooth_dry_scene_computes_neither_friction_nor_cohesion(scene: Scene, ask: Any, fake: Any) -> None:
+    text = deck(ask(dataclasses.replace(scene, friction=0.0, cohesion=0.0)), fake)
     for word in (
         "tangential",
         "coefficientFriction",
@@ -285,24 +283,24 @@ def test_a_smooth_dry_scene_computes_neither_friction_nor_cohesion(spec: Packing
     assert "fix integrate   all nve\n" in text
 
 
-def test_a_smooth_sticky_scene(spec: PackingSpec, ask: Any, fake: Any) -> None:
-    text = deck(ask(spec), fake)
+def test_a_smooth_sticky_scene(scene: Scene, ask: Any, fake: Any) -> None:
+    text = deck(ask(scene), fake)
     assert "pair_style      gran model hertz cohesion sjkr\n" in text
     assert "wall/gran model hertz cohesion sjkr primitive" in text
     for word in ("tangential", "coefficientFriction", "nve/sphere"):
         assert word not in text
 
 
-def test_a_rough_sticky_scene(spec: PackingSpec, ask: Any, fake: Any) -> None:
-    text = deck(ask(dataclasses.replace(spec, friction=0.05)), fake)
+def test_a_rough_sticky_scene(scene: Scene, ask: Any, fake: Any) -> None:
+    text = deck(ask(dataclasses.replace(scene, friction=0.05)), fake)
     assert "pair_style      gran model hertz tangential history cohesion sjkr\n" in text
     assert "coefficientFriction peratomtypepair 1 0.05" in text
     assert "fix integrate   all nve/sphere\n" in text
     assert "contact_distance_factor 1.2" in text  # or an opened contact keeps its spring
 
 
-def test_the_numbers_of_a_deck_are_in_micro_units(make_spec: Callable[..., PackingSpec], ask: Any, fake: Any) -> None:
-    asked = ask(make_spec(particles=100, time_step=0.25e-6, skin=3e-6))
+def test_the_numbers_of_a_deck_are_in_micro_units(make_scene: Callable[..., Scene], ask: Any, fake: Any) -> None:
+    asked = ask(make_scene(particles=100, time_step=0.25e-6, skin=3e-6))
     words = {line.split()[0]: line.split() for line in deck(asked, fake).splitlines() if line.strip()}
     assert words["units"] == ["units", "micro"]
     assert float(words["timestep"][1]) == pytest.approx(0.25, rel=1e-15)
@@ -315,13 +313,13 @@ def test_the_numbers_of_a_deck_are_in_micro_units(make_spec: Callable[..., Packi
     assert f"thermo          {asked.rule.check_steps}\n" in text
 
 
-def test_pictures_are_in_the_deck_only_when_asked_for(spec: PackingSpec, ask: Any, fake: Any) -> None:
-    assert "dump            pictures all custom/vtk" in deck(ask(dataclasses.replace(spec, write_vtk=True)), fake)
-    assert "vtk" not in deck(ask(spec), fake)
+def test_pictures_are_in_the_deck_only_when_asked_for(scene: Scene, ask: Any, fake: Any) -> None:
+    assert "dump            pictures all custom/vtk" in deck(ask(dataclasses.replace(scene, write_vtk=True)), fake)
+    assert "vtk" not in deck(ask(scene), fake)
 
 
-def test_the_published_deck_is_the_paper_s(spec: PackingSpec, ask: Any, fake: Any) -> None:
-    asked = ask(spec)
+def test_the_published_deck_is_the_paper_s(scene: Scene, ask: Any, fake: Any) -> None:
+    asked = ask(scene)
     text = deck(asked, fake, LiggghtsAsPublished())
     assert "tangential history cohesion sjkr" in text  # whatever the friction
     assert "neighbor        50" in text  # a skin of the largest diameter
@@ -370,10 +368,10 @@ def spoil(templates: Path, good: str, bad: str, name: str = "packing.in.j2") -> 
 
 @pytest.mark.liggghts
 def test_an_input_error_reaches_the_user_in_liggghts_s_own_words(
-    templates: Path, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    templates: Path, scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     spoil(templates, "timestep        ", "timestepp       ")
-    (outcome,) = pack_replicates(spec, small_csd, 1, tmp_path / "point", "code")
+    (outcome,) = pack_replicates(scene, 1, tmp_path / "point", "code")
     assert (outcome.status, outcome.attempts) == ("failed", 1)  # no use in trying again
     assert outcome.reason.startswith("LIGGGHTS: Unknown command: timestepp")
     kept = {path.name for path in (tmp_path / "point" / "r0.failed").iterdir()}
@@ -381,25 +379,25 @@ def test_an_input_error_reaches_the_user_in_liggghts_s_own_words(
 
 
 @pytest.mark.liggghts
-def test_a_wrong_argument_reaches_the_user_too(templates: Path, spec: PackingSpec, ask: Any) -> None:
+def test_a_wrong_argument_reaches_the_user_too(templates: Path, scene: Scene, ask: Any) -> None:
     spoil(templates, "gran {{ contact_model }}\npair_coeff", "gran model hurtz\npair_coeff")
     with pytest.raises(EngineError, match="hurtz") as caught:
-        Liggghts().settle(ask(spec))
+        Liggghts().settle(ask(scene))
     assert not caught.value.transient
 
 
 @pytest.mark.liggghts
-def test_lost_spheres_are_an_error_not_a_smaller_packing(templates: Path, spec: PackingSpec, ask: Any) -> None:
+def test_lost_spheres_are_an_error_not_a_smaller_packing(templates: Path, scene: Scene, ask: Any) -> None:
     # without a floor every sphere falls out of the box
     spoil(templates, "fix floor ", "# fix floor ")
     with pytest.raises(EngineError, match=r"[Ll]ost atoms"):
-        Liggghts().settle(ask(spec))
+        Liggghts().settle(ask(scene))
 
 
-def test_a_template_that_asks_for_an_unknown_value_is_named(templates: Path, spec: PackingSpec, ask: Any) -> None:
+def test_a_template_that_asks_for_an_unknown_value_is_named(templates: Path, scene: Scene, ask: Any) -> None:
     spoil(templates, "{{ skin }}", "{{ skinn }}")
     with pytest.raises(EngineError, match=r"packing\.in\.j2: 'skinn' is undefined"):
-        Liggghts().settle(ask(spec))
+        Liggghts().settle(ask(scene))
 
 
 def test_a_template_with_an_error_is_named(templates: Path) -> None:
@@ -430,9 +428,9 @@ def test_a_missing_template_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ],
 )
 def test_a_killed_liggghts_may_be_tried_again(
-    make_spec: Callable[..., PackingSpec], ask: Any, processes: int, victim: str, sign: signal.Signals, says: str
+    make_scene: Callable[..., Scene], ask: Any, processes: int, victim: str, sign: signal.Signals, says: str
 ) -> None:
-    asked: SettleRequest = ask(make_spec(particles=300, processes=processes, time_limit=60.0))
+    asked: SettleRequest = ask(make_scene(particles=300, processes=processes, time_limit=60.0))
     hit: list[int] = []
 
     def kill() -> None:
@@ -454,8 +452,8 @@ def test_a_killed_liggghts_may_be_tried_again(
 
 
 @pytest.mark.liggghts
-def test_the_time_limit_of_a_packing(make_spec: Callable[..., PackingSpec], ask: Any) -> None:
-    asked: SettleRequest = ask(make_spec(particles=300, time_limit=0.3))
+def test_the_time_limit_of_a_packing(make_scene: Callable[..., Scene], ask: Any) -> None:
+    asked: SettleRequest = ask(make_scene(particles=300, time_limit=0.3))
     started = time.monotonic()
     with pytest.raises(EngineError, match=r"time limit of 0\.3 s reached") as caught:
         Liggghts().settle(asked)
@@ -467,18 +465,18 @@ def test_the_time_limit_of_a_packing(make_spec: Callable[..., PackingSpec], ask:
 @pytest.mark.liggghts
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel's parent-death signal is Linux's")
 def test_no_liggghts_outlives_a_killed_parent(
-    make_spec: Callable[..., PackingSpec], small_csd: CrystalSizeDistribution, tmp_path: Path
+    make_scene: Callable[..., Scene], small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     # 2000 spheres take some 10 s: long enough to be found running
     code = (
         "import json, sys; from pathlib import Path\n"
         "from filtercake.crystals.csd import mixture\n"
         "from filtercake.packing.pack import pack_replicates\n"
-        "from filtercake.packing.scene import PackingSpec\n"
-        "spec = PackingSpec.from_dict(json.loads(sys.argv[1]))\n"
-        "pack_replicates(spec, mixture([3e-5, 5e-5], [0.5, 0.5]), 1, Path(sys.argv[2]), 'code')\n"
+        "from filtercake.packing.scene import Scene\n"
+        "scene = Scene.from_dict(json.loads(sys.argv[1]))\n"
+        "pack_replicates(scene, 1, Path(sys.argv[2]), 'code')\n"
     )
-    arguments = [json.dumps(make_spec(particles=2000).as_dict()), str(tmp_path)]
+    arguments = [json.dumps(make_scene(particles=2000).as_dict()), str(tmp_path)]
     parent = subprocess.Popen([sys.executable, "-c", code, *arguments])
     scratch = tmp_path / ".work" / "r0"
     try:
@@ -561,7 +559,7 @@ LIARS = [
 @pytest.mark.parametrize(("script", "says", "attempts"), LIARS)
 def test_a_program_that_is_not_liggghts_is_found_out(
     fake: Any,
-    spec: PackingSpec,
+    scene: Scene,
     small_csd: CrystalSizeDistribution,
     tmp_path: Path,
     script: str,
@@ -571,7 +569,7 @@ def test_a_program_that_is_not_liggghts_is_found_out(
     fake(script)
     lines: list[str] = []
     point = tmp_path / "point"
-    (outcome,) = pack_replicates(spec, small_csd, 1, point, "code", progress=lines.append)
+    (outcome,) = pack_replicates(scene, 1, point, "code", progress=lines.append)
     assert outcome.status == "failed"
     assert re.search(says, outcome.reason), outcome.reason
     assert outcome.attempts == attempts
@@ -583,13 +581,13 @@ def test_a_program_that_is_not_liggghts_is_found_out(
 
 
 def test_a_program_that_hangs_is_stopped(
-    fake: Any, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fake: Any, scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pack_module, "ATTEMPTS", 1)
     fake("exec sleep 1000")
     point = tmp_path / "point"
     started = time.monotonic()
-    (outcome,) = pack_replicates(dataclasses.replace(spec, time_limit=0.5), small_csd, 1, point, "code")
+    (outcome,) = pack_replicates(dataclasses.replace(scene, time_limit=0.5), 1, point, "code")
     assert outcome.status == "failed"
     assert outcome.reason == "time limit of 0.5 s reached; the packing was stopped"
     assert time.monotonic() - started < process.GRACE_SECONDS + 3.0
@@ -604,7 +602,7 @@ def test_a_program_that_hangs_is_stopped(
 def test_one_failed_replicate_leaves_the_others_alone(
     fake: Any,
     liggghts: str,
-    spec: PackingSpec,
+    scene: Scene,
     small_csd: CrystalSizeDistribution,
     tmp_path: Path,
     script: str,
@@ -613,40 +611,40 @@ def test_one_failed_replicate_leaves_the_others_alone(
     fake(f'case "$PWD" in */r1) {script};; *) exec {liggghts} "$@";; esac')
     reported: list[tuple[Outcome, dict[str, Any]]] = []
     point = tmp_path / "point"
-    outcomes = pack_replicates(spec, small_csd, 3, point, "code", lambda o, r: reported.append((o, r)))
+    outcomes = pack_replicates(scene, 3, point, "code", lambda o, r: reported.append((o, r)))
     assert [outcome.status for outcome in outcomes] == ["ok", "failed", "ok"]
     assert says in outcomes[1].reason
     assert [outcome for outcome, _ in reported] == outcomes
     assert [record.get("replicate") for _, record in reported] == [0, None, 2]
     for k in (0, 2):
-        assert Packing.load(point / f"r{k}.npz").diagnostics["seed"] == cloud_seed(spec, small_csd, k)
+        assert Packing.load(point / f"r{k}.npz").diagnostics["seed"] == cloud_seed(scene, k)
     assert not (point / "r1.npz").exists()
 
 
 @pytest.mark.liggghts
 def test_a_passing_failure_is_tried_again(
-    fake: Any, liggghts: str, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    fake: Any, liggghts: str, scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     fake(f'if [ ! -e {tmp_path}/once ]; then : > {tmp_path}/once; kill -KILL $$; fi; exec {liggghts} "$@"')
-    (outcome,) = pack_replicates(spec, small_csd, 1, tmp_path / "point", "code")
+    (outcome,) = pack_replicates(scene, 1, tmp_path / "point", "code")
     assert (outcome.status, outcome.attempts, outcome.reason) == ("ok", 2, "")
     assert not (tmp_path / "point" / "r0.failed").exists()
 
 
-def test_a_cloud_that_does_not_fit_is_an_outcome(fake: Any, spec: PackingSpec, tmp_path: Path) -> None:
+def test_a_cloud_that_does_not_fit_is_an_outcome(fake: Any, scene: Scene, tmp_path: Path) -> None:
     fake("exit 0")
-    one = dataclasses.replace(spec, particles=1)
-    (outcome,) = pack_replicates(one, mixture([300 * UM], [1.0]), 1, tmp_path, "code")
+    one = dataclasses.replace(scene, particles=1, csd=mixture([300 * UM], [1.0]))
+    (outcome,) = pack_replicates(one, 1, tmp_path, "code")
     assert (outcome.status, outcome.attempts) == ("failed", 1)
     assert "wider than the periodic box" in outcome.reason
 
 
 def test_a_missing_engine_is_no_outcome(
-    monkeypatch: pytest.MonkeyPatch, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("FILTERCAKE_LIGGGHTS", "/no/such/liggghts")
     with pytest.raises(EngineMissing, match="LIGGGHTS is not at /no/such/liggghts"):
-        pack_replicates(spec, small_csd, 1, tmp_path, "code")
+        pack_replicates(scene, 1, tmp_path, "code")
     with pytest.raises(EngineMissing, match="engine 'lammps' is not known; choose one of liggghts"):
         get_engine("lammps")
 
@@ -656,7 +654,7 @@ def test_a_missing_engine_is_no_outcome(
 
 @pytest.mark.liggghts
 def test_finished_replicates_are_kept_and_damaged_ones_made_again(
-    fake: Any, liggghts: str, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    fake: Any, liggghts: str, scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     point, calls = tmp_path / "point", tmp_path / "calls"
     fake(f'echo "$PWD" >> {calls}; exec {liggghts} "$@"')
@@ -666,44 +664,44 @@ def test_finished_replicates_are_kept_and_damaged_ones_made_again(
         calls.unlink(missing_ok=True)
         return names
 
-    first = pack_replicates(spec, small_csd, 2, point, "code")
+    first = pack_replicates(scene, 2, point, "code")
     assert packed_now() == ["r0", "r1"]
     assert [outcome.status for outcome in first] == ["ok", "ok"]
     assert len({outcome.seed for outcome in first}) == len({outcome.sha256 for outcome in first}) == 2
 
     # nothing to do: nothing is run, and the outcomes are the same
-    assert pack_replicates(spec, small_csd, 2, point, "code") == first
+    assert pack_replicates(scene, 2, point, "code") == first
     assert packed_now() == []
 
     # one more is asked for: only that one is made
-    third = pack_replicates(spec, small_csd, 3, point, "code")
+    third = pack_replicates(scene, 3, point, "code")
     assert packed_now() == ["r2"]
     assert third[:2] == first
 
     # a damaged geometry, a lost record: made again, to the same bits
     (point / "r0.npz").write_bytes((point / "r0.npz").read_bytes()[:-1])
     (point / "r1.json").unlink()
-    assert pack_replicates(spec, small_csd, 3, point, "code") == third
+    assert pack_replicates(scene, 3, point, "code") == third
     assert packed_now() == ["r0", "r1"]
     for k in range(3):
         assert Packing.load(point / f"r{k}.npz").radius.size == 100
 
-    # other code or another spec: all are made again
-    assert pack_replicates(spec, small_csd, 1, point, "other code")[0].sha256 == first[0].sha256
+    # other code or another scene: all are made again
+    assert pack_replicates(scene, 1, point, "other code")[0].sha256 == first[0].sha256
     assert packed_now() == ["r0"]
-    sticky = dataclasses.replace(spec, cohesion=80e3)
-    (other,) = pack_replicates(sticky, small_csd, 1, point, "other code")
+    sticky = dataclasses.replace(scene, cohesion=80e3)
+    (other,) = pack_replicates(sticky, 1, point, "other code")
     assert packed_now() == ["r0"]
     assert other.seed == first[0].seed
     assert other.sha256 != first[0].sha256
 
 
 def test_a_failed_packing_leaves_no_old_one_behind(
-    fake: Any, spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    fake: Any, scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     fake("exit 1")
     Packing(np.zeros((1, 3)), np.ones(1), 1.0, {"key": "another"}).save(tmp_path / "r0.npz")
-    (outcome,) = pack_replicates(spec, small_csd, 1, tmp_path, "code")
+    (outcome,) = pack_replicates(scene, 1, tmp_path, "code")
     assert outcome.status == "failed"
     assert not (tmp_path / "r0.npz").exists()
     assert not (tmp_path / "r0.json").exists()
@@ -711,10 +709,10 @@ def test_a_failed_packing_leaves_no_old_one_behind(
 
 @pytest.mark.liggghts
 def test_a_bed_that_is_given_too_little_time_is_refused_for_good(
-    spec: PackingSpec, small_csd: CrystalSizeDistribution, tmp_path: Path
+    scene: Scene, small_csd: CrystalSizeDistribution, tmp_path: Path
 ) -> None:
     with pytest.raises(PackingRejected, match=r"not settled after .* raise packing\.max_fall_times") as caught:
-        pack(dataclasses.replace(spec, max_fall_times=1.0), small_csd, 0, tmp_path)
+        pack(dataclasses.replace(scene, max_fall_times=1.0), 0, tmp_path)
     assert not caught.value.transient
 
 
@@ -738,8 +736,8 @@ def test_an_engine_that_is_there_is_given(tmp_path: Path, monkeypatch: pytest.Mo
     assert Liggghts().why_missing() is None
 
 
-def test_a_cloud_is_not_changed_by_its_engine(spec: PackingSpec, ask: Any, fake: Any) -> None:
-    asked: SettleRequest = ask(spec)
+def test_a_cloud_is_not_changed_by_its_engine(scene: Scene, ask: Any, fake: Any) -> None:
+    asked: SettleRequest = ask(scene)
     before: Cloud = dataclasses.replace(asked.cloud, position=asked.cloud.position.copy())
     deck(asked, fake)
     assert np.array_equal(asked.cloud.position, before.position)

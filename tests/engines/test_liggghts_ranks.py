@@ -15,9 +15,10 @@ from filtercake.crystals.csd import mixture
 from filtercake.errors import EngineError
 from filtercake.packing.engines.liggghts import LOOK_SECONDS, find_executable
 from filtercake.packing.pack import pack
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 
-SCENE = PackingSpec(
+SCENE = Scene(
+    csd=mixture([30e-6, 50e-6], [0.5, 0.5]),
     particles=2000,
     initial_void_fraction=0.65,
     settling_velocity=0.01,

@@ -101,7 +101,7 @@ def _check_study(study: LoadedStudy, points: Iterable[Point]) -> None:
     for point in points:
         _require(re.fullmatch(r"[A-Za-z0-9_.-]{1,200}", point.name) and point.name.strip("."), f"name {point.name!r}")
         json.dumps(point.as_dict(), allow_nan=False)
-        _require(0.0 < point.spec.time_step < math.inf and point.spec.particles <= 2_000_000, "spec")
+        _require(0.0 < point.scene.time_step < math.inf and point.scene.particles <= 2_000_000, "scene")
 
 
 def _check_calibration(calibration: LoadedCalibration) -> None:

@@ -40,9 +40,9 @@ class Checkout:
     def run(self, *arguments: str, study: str = TINY, **environment: str) -> subprocess.CompletedProcess:
         return self.snakemake("--config", f"studies={study}", *arguments, **environment)
 
-    def planned(self, study: str = TINY) -> Counter:
+    def planned(self, *targets: str, study: str = TINY) -> Counter:
         """Jobs that a run would start, by rule."""
-        done = self.run("--dry-run", "--quiet", "host", study=study)
+        done = self.run("--dry-run", "--quiet", "host", "--", *targets, study=study)
         assert done.returncode == 0, done.stderr + done.stdout
         text = done.stdout + done.stderr
         table = re.search(r"^job +count\n-+ +-+\n(?P<rows>.*?)^total", text, re.MULTILINE | re.DOTALL)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+from itertools import chain
 from pathlib import Path
 
 import pandas as pd
@@ -13,25 +12,27 @@ from checkouts import Checkout
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize(
-    ("target", "jobs"),
-    [
-        ("agreement", ["compare_engines", "replicates", "packing", "csd"]),
-        ("speed", ["time_in_turn"]),
-        ("growth", ["time_growth"]),
-        ("reference", ["gather_references", "replicates", "packing"]),
-        ("benchmark", ["time_variants", "choices", "coverage", "benchmark_page"]),
-        ("stability", ["stress", "stability_page"]),
-        ("twin", ["repeat_calibrations", "replicates", "packing", "csd"]),
-        ("bed_size", ["compare_sizes", "replicates", "packing", "csd"]),
-    ],
-)
-def test_a_benchmark_is_planned(target: str, jobs: list[str], tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", "rules", "--cores", "2", target]
-    command += ["--config", f"results={tmp_path / 'results'}"]
-    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0, done.stderr
-    assert all(job in done.stdout + done.stderr for job in jobs)
+JOBS = {
+    "agreement": ["compare_engines", "replicates", "packing", "csd"],
+    "speed": ["time_in_turn"],
+    "growth": ["time_growth"],
+    "reference": ["gather_references"],
+    "benchmark": ["time_variants", "choices", "coverage", "benchmark_page"],
+    "stability": ["stress", "stability_page"],
+    "twin": ["repeat_calibrations"],
+    "bed_size": ["compare_sizes"],
+}
+
+
+def test_every_benchmark_is_planned(checkout: Checkout) -> None:
+    """All of them by one start; a packing for each point of the studies behind them."""
+    planned = checkout.planned(*JOBS)
+    assert {*JOBS, *chain(*JOBS.values())} <= set(planned)
+    assert planned["compare_engines"] == planned["gather_references"] == planned["repeat_calibrations"] == 1
+    studies = [path.stem for path in (checkout.root / "config" / "benchmarks").glob("*.yaml")]
+    behind = [name for name in studies if name.startswith(("agreement", "reference", "twin"))]
+    assert planned["replicates"] == len(behind) + sum(name.startswith("agreement") for name in behind) + 2
+    assert planned["packing"] > planned["replicates"]
 
 
 def test_pages_are_drawn_again_from_the_committed_tables(checkout: Checkout) -> None:
@@ -76,8 +77,8 @@ def test_both_engines_make_the_same_points() -> None:
     for path in sorted((REPOSITORY / "config" / "benchmarks").glob("agreement_*.yaml")):
         study = load_study(path)
         one, other = (expand(with_engine(study, engine), lambda *_: "") for engine in ("liggghts", "embedded"))
-        assert [point.spec.engine for point in one] == ["liggghts"] * len(one)
+        assert [point.scene.engine for point in one] == ["liggghts"] * len(one)
         for a, b in zip(one, other, strict=True):
             assert a.name != b.name
-            assert {**a.spec.as_dict(), "engine": ""} == {**b.spec.as_dict(), "engine": ""}
+            assert {**a.scene.as_dict(), "engine": ""} == {**b.scene.as_dict(), "engine": ""}
             assert a.study == f"{path.stem}_liggghts"

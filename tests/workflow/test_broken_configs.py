@@ -1,6 +1,7 @@
 """Every broken configuration gets one clear error that names file, key, value and what is allowed; no job starts."""
 
 import pytest
+from checkouts import TINY, copy_project
 
 BROKEN = {
     "unknown key": ("packing:\n", "packing:\n  colour: red\n", ["packing.colour", "red", "unknown key", "particles"]),
@@ -36,24 +37,46 @@ BROKEN = {
 }
 
 
-def start(checkout, text):
-    study = checkout.root / "config/test/broken.yaml"
-    study.write_text(text)
-    done = checkout.run("--dry-run", study="config/test/broken.yaml")
-    return done.returncode, done.stdout + done.stderr
+@pytest.fixture(scope="module")
+def refused(tmp_path_factory):
+    """What a start with all of the broken studies says; there is one start, for every study's problems are told."""
+    checkout = copy_project(tmp_path_factory.mktemp("broken") / "project")
+    good = (checkout.root / TINY).read_text()
+    for name, (old, new, _) in BROKEN.items():
+        assert old in good
+        (checkout.root / path_of(name)).write_text(good.replace(old, new))
+    two = good.replace("particles: 400", "particles: many").replace("  replicates: 2", "  replicats: 2")
+    (checkout.root / path_of("two at once")).write_text(two)
+    done = checkout.run("--dry-run", study=",".join(path_of(name) for name in (*BROKEN, "two at once")))
+    assert done.returncode != 0
+    return done.stdout + done.stderr
+
+
+def path_of(name):
+    return f"config/test/{name.replace(' ', '_')}.yaml"
+
+
+def said_of(name, output):
+    """The lines about a study, each with what belongs to it."""
+    return "\n".join(line for line in output.splitlines() if f"{path_of(name)}: " in line)
+
+
+def test_nothing_but_clear_errors_is_said(refused):
+    assert refused.count("filtercake cannot start") == 1
+    assert "Traceback" not in refused and "Building DAG" not in refused
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_is_one_clear_error(checkout, case):
-    old, new, words = BROKEN[case]
-    text = (checkout.root / "config/test/tiny.yaml").read_text()
-    assert old in text
-    status, output = start(checkout, text.replace(old, new))
-    assert status != 0
-    assert "filtercake cannot start" in output and "config/test/broken.yaml" in output
-    assert "Traceback" not in output
-    for word in words:
-        assert word in output, f"{word!r} not in:\n{output}"
+def test_is_one_clear_error(refused, case):
+    said = said_of(case, refused)
+    assert said.count("\n") == 0
+    for word in BROKEN[case][2]:
+        assert word in said, f"{word!r} not in:\n{refused}"
+
+
+def test_all_problems_of_a_study_at_once(refused):
+    said = said_of("two at once", refused)
+    assert "packing.particles" in said and "packing.replicats" in said
 
 
 def test_missing_engine(checkout):
@@ -64,13 +87,6 @@ def test_missing_engine(checkout):
     assert done.returncode != 0
     for word in ("broken.yaml", "packing.engine", "liggghts", "/nowhere/liggghts"):
         assert word in output
-
-
-def test_all_problems_at_once(checkout):
-    text = (checkout.root / "config/test/tiny.yaml").read_text()
-    text = text.replace("particles: 400", "particles: many").replace("  replicates: 2", "  replicats: 2")
-    _, output = start(checkout, text)
-    assert "packing.particles" in output and "packing.replicats" in output
 
 
 def test_unknown_study_and_key_on_the_command_line(checkout):

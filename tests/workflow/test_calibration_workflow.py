@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -119,27 +120,56 @@ def test_other_measurements_keep_the_packings(calibrated: Checkout) -> None:
     assert parity["measured_m_kg"].iloc[1] == pytest.approx(1.6e9)
 
 
-@pytest.mark.parametrize(
-    ("file", "old", "new", "said"),
-    [
-        ("tiny.yaml", "study: ../tiny.yaml", "study: nowhere", "study = 'nowhere': no such study"),
-        ("tiny.yaml", "replicates: 2", "replicates: 1", "replicates = 1: must be greater than or equal to 2"),
-        ("tiny.yaml", "rounds: 2", "round: 2", "did you mean rounds?"),
-        ("tiny.yaml", "predict: [from_file]", "predict: [other]", "predict[0] = 'other': not in the study"),
-        ("tiny.yaml", "high: 80", "high: 500", "cohesion_kJ_m3.high = 500: must be at most"),
-        ("tiny_measurements.yaml", "{csd: bimodal", "{csd: other", "not in the study; allowed: bimodal, from_file"),
-        (
-            "tiny_measurements.yaml",
-            "1.5e+9",
-            "-1",
-            "resistances[0].resistance_m_kg = -1: must be greater than or equal to 1",
-        ),
-        ("tiny_test.csv", "volume_mL", "volume", "tiny_test.csv"),
-    ],
-)
-def test_what_is_wrong_is_said_before_any_job(checkout: Checkout, file: str, old: str, new: str, said: str) -> None:
-    path = checkout.root / "config/test/calibration" / file
-    path.write_text(path.read_text().replace(old, new))
-    done = calibrate(checkout, "--dry-run")
-    assert done.returncode != 0 and "filtercake cannot start" in done.stderr
-    assert said in done.stderr and "Traceback" not in done.stderr
+BROKEN = {
+    "no_study": ("tiny.yaml", "study: ../tiny.yaml", "study: nowhere", "study = 'nowhere': no such study"),
+    "replicates": ("tiny.yaml", "replicates: 2", "replicates: 1", "replicates = 1: must be greater than or equal to 2"),
+    "key": ("tiny.yaml", "rounds: 2", "round: 2", "did you mean rounds?"),
+    "prediction": (
+        "tiny.yaml",
+        "predict: [from_file]",
+        "predict: [other]",
+        "predict[0] = 'other': not in the study",
+    ),
+    "cohesion": ("tiny.yaml", "high: 80", "high: 500", "cohesion_kJ_m3.high = 500: must be at most"),
+    "measured": (
+        "tiny_measurements.yaml",
+        "{csd: bimodal",
+        "{csd: other",
+        "not in the study; allowed: bimodal, from_file",
+    ),
+    "resistance": (
+        "tiny_measurements.yaml",
+        "1.5e+9",
+        "-1",
+        "resistances[0].resistance_m_kg = -1: must be greater than or equal to 1",
+    ),
+    "column": ("tiny_test.csv", "volume_mL", "volume", "tiny_test.csv"),
+}
+"""Which file of the tiny calibration is broken, how, and what must be said."""
+
+
+@pytest.fixture(scope="module")
+def refused(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What a start with all of the broken calibrations says; each has a folder of its own, where its name stands."""
+    checkout = copy_project(tmp_path_factory.mktemp("refused") / "project")
+    tiny = (checkout.root / TINY).parent
+    for name, (file, old, new, _) in BROKEN.items():
+        folder = tiny.with_name(name)
+        shutil.copytree(tiny, folder)
+        text = (folder / file).read_text()
+        assert old in text
+        (folder / file).write_text(text.replace(old, new))
+        (folder / "tiny.yaml").rename(folder / f"{name}.yaml")
+    names = ",".join(f"config/test/{name}/{name}.yaml" for name in BROKEN)
+    done = checkout.snakemake("calibrate", "--config", f"calibrations={names}", "--dry-run")
+    assert done.returncode != 0 and done.stderr.count("filtercake cannot start") == 1
+    assert "Traceback" not in done.stderr and "Building DAG" not in done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_what_is_wrong_is_said_before_any_job(refused: str, case: str) -> None:
+    file, _, _, said = BROKEN[case]
+    # the names of distributions are looked up last, and their file then named without its folder
+    lines = [line for line in refused.splitlines() if line.startswith((f"config/test/{case}/", f"{file}: "))]
+    assert any(said in line for line in lines), refused

@@ -28,7 +28,7 @@ def test_its_table_is_made_and_read_by_the_figures(checkout):
     folder = checkout.root / "config/test"
     (folder / "salt.yaml").write_text(STUDY)
     (folder / "own.yaml").write_text(OWN)
-    assert checkout.planned("config/test/salt.yaml")["crystallizer"] == 1
+    assert checkout.planned(study="config/test/salt.yaml")["crystallizer"] == 1
     done = checkout.run("--", "results/salt/tables/crystallizer.csv", study="config/test/salt.yaml")
     assert done.returncode == 0, done.stderr + done.stdout
     table = pd.read_csv(checkout.root / "results/salt/tables/crystallizer.csv")

@@ -145,7 +145,7 @@ rule calibration_figure:
     benchmark:
         "{results}/{calibration}/benchmarks/figures/{figure}.tsv"
     wildcard_constraints:
-        figure="|".join(calibrated.CALIBRATION_FIGURES),
+        figure="|".join(catalogue.CALIBRATION_FIGURES),
     group:
         "figures"
     conda:
@@ -154,7 +154,7 @@ rule calibration_figure:
         mem_mb=2000,
         runtime=figure_minutes,
     params:
-        library=lambda wildcards: library(calibrated.module_of(wildcards.figure)),
+        library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
         title=lambda wildcards: calibration_of(wildcards).model.title,
         labels=lambda wildcards: {
             name: csd.label

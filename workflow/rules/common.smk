@@ -2,18 +2,14 @@
 # with every problem of every file when something is wrong.
 import atexit
 import os
+import re
 import time
 from dataclasses import replace
 from functools import cache
 
-from filtercake.calibration.config import (
-    candidates as calibration_candidates,
-    load_calibrations,
-    settings_of,
-)
 import pandas as pd
 from filtercake.crystals.csd import from_table
-from filtercake.figures import calibrated, catalogue
+from filtercake.figures import catalogue
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST, count_kept, point_key
 from filtercake.packing.result import read_record
@@ -22,9 +18,8 @@ from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.run.provenance import code_hash, packing_code, sources
 from filtercake.study import engine_choice, estimate
 from filtercake.study.loading import find_studies, load_studies
-from filtercake.study.points import expand as expand_points, with_engine
+from filtercake.study.points import expand as expand_points
 from filtercake.units import MICROMETRE, MINUTE
-from filtercake.validation.stability import families as stress_families
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
@@ -34,6 +29,9 @@ for handler in logger.handlers:
 
 STUDY_FILES = Path(in_use("config/studies"))
 CALIBRATION_FILES = Path(in_use("config/calibrations"))
+VALIDATION = ROOT / "workflow" / "rules" / "validation.smk"
+# studies whose names do not hold that of a rule of validation
+BED_SIZES = ["alum", "alum_full"]
 
 
 def points_by_name(studies):
@@ -52,12 +50,17 @@ try:
         for study in load_studies(find_studies(settings, STUDY_FILES, CONFIG_FILE))
     }
     POINTS = points_by_name(STUDIES)
-    CALIBRATIONS = load_calibrations(
-        settings.calibrations,
-        CALIBRATION_FILES,
-        STUDY_FILES,
-        CONFIG_FILE,
-    )
+    CALIBRATIONS = []
+    if settings.calibrations:
+        # imports the solvers, which studies need not wait for
+        from filtercake.calibration.config import load_calibrations
+
+        CALIBRATIONS = load_calibrations(
+            settings.calibrations,
+            CALIBRATION_FILES,
+            STUDY_FILES,
+            CONFIG_FILE,
+        )
     engine_choice.check([*STUDIES.values(), *(item.study for item in CALIBRATIONS)])
 except FiltercakeError as error:
     stop(error)
@@ -149,11 +152,6 @@ def csd_file(wildcards):
     return [str(file)] if file else []
 
 
-def packed_csd(wildcards):
-    """The distribution that a point packs."""
-    return study_of(wildcards).csds[point_of(wildcards).csd].truncated
-
-
 def is_slurm():
     """Whether this process submits to Slurm; known once all rules are read."""
     return getattr(workflow.executor_plugin, "name", None) == "slurm"
@@ -185,10 +183,7 @@ def granted_minutes():
 def packing_minutes(wildcards, attempt):
     """Walltime from measured run times; doubled on every retry, within what is granted."""
     return estimate.walltime_minutes(
-        point_of(wildcards),
-        packed_csd(wildcards),
-        attempt,
-        granted=granted_minutes(),
+        point_of(wildcards), attempt, granted=granted_minutes()
     )
 
 
@@ -201,9 +196,7 @@ def figure_minutes(wildcards):
 
 def packing_group(wildcards):
     """Name of the submissions that short points share on a cluster; the profile says how many."""
-    size = estimate.group_size(
-        point_of(wildcards), packed_csd(wildcards), granted=granted_minutes()
-    )
+    size = estimate.group_size(point_of(wildcards), granted=granted_minutes())
     return f"packing_{size}" if size > 1 else None
 
 
@@ -236,7 +229,7 @@ def missing_packings(study, point):
     if not (packings.is_dir() and table.is_file()):
         return point.replicates
     _, csd = from_table(pd.read_csv(table))
-    key = point_key(packing_code(point.spec.engine), point.spec, csd)
+    key = point_key(packing_code(point.scene.engine), replace(point.scene, csd=csd))
     return point.replicates - count_kept(packings, key, point.replicates)
 
 
@@ -248,7 +241,6 @@ def cost_of(points_by_study, missing):
                 replace(point, replicates=missing[study][name])
                 for name, point in points.items()
             ],
-            {name: csd.truncated for name, csd in KNOWN[study].csds.items()},
             on_cluster=not workflow.local_exec,
         )
         for study, points in points_by_study.items()
@@ -258,8 +250,8 @@ def cost_of(points_by_study, missing):
 def too_long():
     """Say which points are expected to take longer than their partition grants."""
     seconds = [
-        estimate.job_seconds(point, KNOWN[study].csds[point.csd].truncated)
-        for study, points in points_to_make().items()
+        estimate.job_seconds(point)
+        for points in points_to_make().values()
         for point in points.values()
     ]
     late = [item for item in seconds if item > MINUTE * granted_minutes()]
@@ -323,6 +315,25 @@ def announce_dry_run():
 if not is_module:
     # Snakemake starts no handler for a dry run, and says after the rules are read that it is one
     atexit.register(announce_dry_run)
+
+
+def validation_is_asked():
+    """Whether the command line names a rule of validation, one of its files or one of its studies; in doubt, yes.
+
+    Snakemake gives a workflow its targets only once all rules are read, so the words it was started with are
+    searched; it starts itself for single jobs, here or on a cluster, with their rules and wildcards in plain words.
+    """
+    program, *words = sys.argv
+    started_by = [part.removesuffix(".py") for part in Path(program).parts]
+    if started_by[-1] != "snakemake" and started_by[-2:] != ["snakemake", "__main__"]:
+        return True
+    if any(word.startswith(("--li", "--lt", "-l")) for word in words):
+        return True  # lists or checks every rule
+    names = re.findall(r"^rule\s(\w+)", VALIDATION.read_text(), re.MULTILINE)
+    names += [name for name in BED_SIZES if name not in STUDIES]
+    keys = tuple(f"{key}=" for key in type(settings).model_fields)
+    targets = [word for word in words if not word.startswith(keys)]
+    return any(name in target for target in targets for name in names)
 
 
 def bed_size_tables(wildcards):

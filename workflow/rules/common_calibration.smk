@@ -1,4 +1,10 @@
 # What the rules of calibrations share: points, and which of them the rounds so far ask for.
+if CALIBRATIONS:
+    from filtercake.calibration.config import (
+        candidates as calibration_candidates,
+        settings_of,
+    )
+
 CALIBRATED = {calibration.name: calibration for calibration in CALIBRATIONS}
 CANDIDATES = {
     name: {
@@ -96,7 +102,7 @@ def prediction_tables(wildcards):
 
 def outputs_of_calibration(name):
     calibration, folder = CALIBRATED[name], f"{RESULTS}/{name}"
-    figures = calibrated.figures_of(
+    figures = catalogue.figures_of_calibration(
         bool(calibration.model.predict), calibration.measurements
     )
     found = [f"{folder}/calibration.json", f"{folder}/tables/fits.csv"]

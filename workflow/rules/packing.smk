@@ -15,14 +15,16 @@ rule packing:
         packing_group
     conda:
         "../envs/filtercake.yaml"
-    threads: lambda wildcards: parallelism(point_of(wildcards).spec)
+    threads: lambda wildcards: parallelism(point_of(wildcards).scene)
     resources:
-        mem_mb=lambda wildcards: estimate.memory_mb(point_of(wildcards).spec),
+        mem_mb=lambda wildcards: estimate.memory_mb(point_of(wildcards).scene),
         runtime=packing_minutes,
-        cpus_per_task=lambda wildcards: parallelism(point_of(wildcards).spec),
+        cpus_per_task=lambda wildcards: parallelism(point_of(wildcards).scene),
     params:
-        code=lambda wildcards: packing_code(point_of(wildcards).spec.engine),
-        spec=lambda wildcards: point_of(wildcards).spec.as_dict(),
+        code=lambda wildcards: packing_code(point_of(wildcards).scene.engine),
+        scene=lambda wildcards: point_of(wildcards).scene.decisive(),
+        # what follows from resources is no reason to make a packing again
+        incidental=lambda wildcards, resources: point_of(wildcards).scene.incidental(),
         replicates=lambda wildcards: point_of(wildcards).replicates,
         most=lambda wildcards: point_of(wildcards).most_replicates,
         interval=lambda wildcards: point_of(wildcards).porosity_ci95_target,

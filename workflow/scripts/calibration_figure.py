@@ -5,8 +5,9 @@ from pathlib import Path
 import pandas as pd
 
 from filtercake.calibration.measurements import load_measurements
-from filtercake.figures.calibrated import CalibrationData, draw
-from filtercake.figures.catalogue import save
+from filtercake.figures.calibrated import CalibrationData
+from filtercake.figures.catalogue import draw
+from filtercake.figures.style import save
 from filtercake.packing.result import read_record
 from filtercake.run.job import job
 

@@ -12,9 +12,8 @@ from filtercake.validation.error_against_time import choice_table, choices, time
 with job(snakemake.log[0], snakemake.output) as log:
     study = load_study(Path(snakemake.params.study))
     wide = load_study(Path(snakemake.params.wide)).csds[snakemake.params.wide_csd]
-    name = snakemake.params.csd
-    spec = base_point(study, name, engine_choice.choose).spec
-    listed = choices(spec, study.csds[name].full, snakemake.params.replicates)
+    scene = base_point(study, snakemake.params.csd, engine_choice.choose).scene
+    listed = choices(scene, snakemake.params.replicates)
     timings = time_variants(
         [listed[0].against, *(item.variant for item in listed)],
         lambda line: (log.info(line), Progress().note(line)),

@@ -16,8 +16,7 @@ with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case
     study = with_engine(load_study(Path(case["study"])), Embedded.name)
     table = coverage(
-        base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).spec,
-        study.csds[case["csd"]].truncated,
+        base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).scene,
         reference_of(pd.read_csv(snakemake.input.reference), case["reference"], case["friction"]),
         snakemake.params.interval,
         snakemake.params.repeats,

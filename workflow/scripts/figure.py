@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from filtercake.figures.catalogue import StudyData, draw, save
+from filtercake.figures.catalogue import draw
+from filtercake.figures.selection import StudyData
+from filtercake.figures.style import save
 from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output):

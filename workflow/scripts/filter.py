@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.crystals.csd import from_table
+from filtercake.crystals.csd import read_tables
 from filtercake.packing.result import publish
 from filtercake.results.filter_design import filter_design
 from filtercake.run.job import job
@@ -12,7 +12,7 @@ from filtercake.study.config.study import Study
 
 with job(snakemake.log[0], snakemake.output) as log, publish(Path(snakemake.output[0])) as temporary:
     study = Study.model_validate(snakemake.params.study)
-    csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds}
+    csds = read_tables(snakemake.input.csds)
     table = filter_design(study, csds, pd.read_csv(snakemake.input.summary))
     for point, warnings in zip(table["point"], table["filter_warnings"], strict=True):
         if warnings:

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from filtercake.figures.catalogue import save
-from filtercake.figures.style import applied
+from filtercake.figures.style import applied, save
 from filtercake.packing.result import publish
 from filtercake.run.job import Progress, job
 from filtercake.study import engine_choice
@@ -14,9 +13,9 @@ from filtercake.validation.growth import Case, time_growth
 
 with job(snakemake.log[0], snakemake.output) as log:
     study = load_study(Path(snakemake.params.study))
-    spec = base_point(study, snakemake.params.csd, engine_choice.choose).spec
+    scene = base_point(study, snakemake.params.csd, engine_choice.choose).scene
     table = time_growth(
-        spec,
+        scene,
         [Case(**case) for case in snakemake.params.cases],
         lambda line: (log.info(line), Progress().note(line)),
     )

@@ -1,5 +1,6 @@
 """Rule packing: make all replicates of a point."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -7,11 +8,11 @@ import pandas as pd
 from filtercake.crystals.csd import from_table
 from filtercake.packing.pack import pack_replicates
 from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.run.job import Progress, job
 
 
-def main(table, spec, asked, manifest, point, logger):
+def main(table, asked, manifest, point, logger):
     """Pack and report each replicate as it comes."""
     progress = Progress()
 
@@ -28,9 +29,10 @@ def main(table, spec, asked, manifest, point, logger):
         progress.note(f"{point} {line}")
 
     _, truncated = from_table(pd.read_csv(table))
-    spec = PackingSpec.from_dict(spec)
-    enough = UntilNarrow(spec, asked.interval, asked.replicates) if asked.interval else lambda _: False
-    pack_replicates(spec, truncated, asked.most, Path(manifest).parent, asked.code, report, note, enough)
+    # sizes as the table has them: what is packed is what the resistance is computed for
+    scene = replace(Scene.from_dict({**asked.scene, **asked.incidental}), csd=truncated)
+    enough = UntilNarrow(scene, asked.interval, asked.replicates) if asked.interval else lambda _: False
+    pack_replicates(scene, asked.most, Path(manifest).parent, asked.code, report, note, enough)
     if asked.interval:
         note(f"interval {enough.half_width:.2g} after {len(enough.values)} packings, {asked.interval:g} asked for")
 
@@ -38,7 +40,6 @@ def main(table, spec, asked, manifest, point, logger):
 with job(snakemake.log[0], snakemake.output) as log:
     main(
         snakemake.input.csd,
-        snakemake.params.spec,
         snakemake.params,
         snakemake.output[0],
         snakemake.wildcards.point,

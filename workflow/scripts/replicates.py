@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-import pandas as pd
-
-from filtercake.crystals.csd import from_table
+from filtercake.crystals.csd import read_tables
 from filtercake.packing.result import publish
 from filtercake.results.replicates import replicates_table
 from filtercake.run.job import job
@@ -13,7 +11,7 @@ from filtercake.study.points import Point
 
 def main(points, packings, csd_tables, sphericity, output):
     """Measure and write the table."""
-    csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in csd_tables}
+    csds = read_tables(csd_tables)
     table = replicates_table(points, packings, csds, sphericity)
     with publish(output) as temporary:
         table.to_csv(temporary, index=False)

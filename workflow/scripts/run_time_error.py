@@ -15,10 +15,10 @@ from filtercake.validation.error_against_time import errors, reference_of, time_
 with job(snakemake.log[0], snakemake.output) as log:
     case, name = snakemake.params.case, snakemake.wildcards.case
     study = load_study(Path(case["study"]))
-    spec = base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).spec
-    spec = replace(spec, particles=case["particles"])
+    scene = base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).scene
+    scene = replace(scene, particles=case["particles"])
     csd = study.csds[case["csd"]]
-    listed = variants(name, spec, csd.full, quick=snakemake.params.quick)
+    listed = variants(name, scene, csd.full, quick=snakemake.params.quick)
     timings = pd.concat(
         [
             time_variants(listed, lambda line: (log.info(line), Progress().note(line))),

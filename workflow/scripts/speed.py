@@ -14,16 +14,15 @@ from filtercake.validation.timing import compare, contender, time_in_turn
 with job(snakemake.log[0], snakemake.output) as log:
     case = snakemake.params.case
     study = load_study(Path(case["study"]))
-    spec = base_point(study, case["csd"], engine_choice.choose).spec
-    spec = replace(spec, particles=case.get("particles", spec.particles), processes=case["processes"])
+    scene = base_point(study, case["csd"], engine_choice.choose).scene
+    scene = replace(scene, particles=case.get("particles", scene.particles), processes=case["processes"])
     published = {
         "time_step": case.get("time_step_us", 0.0) * MICROSECOND,
         "skin": case.get("skin_um", 0.0) * MICROMETRE,
         "steps": case.get("steps", 0),
     }
     timings = time_in_turn(
-        [contender(name, spec, **published) for name in case["engines"]],
-        study.csds[case["csd"]].truncated,
+        [contender(name, scene, **published) for name in case["engines"]],
         case["replicates"],
         lambda line: (log.info(line), Progress().note(line)),
     )

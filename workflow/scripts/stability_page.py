@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.figures.catalogue import save
-from filtercake.figures.style import applied
+from filtercake.figures.style import applied, save
 from filtercake.packing.result import publish
 from filtercake.run.job import job
 from filtercake.validation import pages

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from filtercake.figures.catalogue import StudyData
+from filtercake.figures.selection import StudyData
 from filtercake.packing.result import read_record
 from filtercake.report import captions, pages
 from filtercake.run.job import job

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from filtercake.crystals.csd import from_table
+from filtercake.crystals.csd import read_tables
 from filtercake.packing.result import publish
 from filtercake.results.paper_tables import comparison, table1, table2, table4
 from filtercake.run.job import job
@@ -12,7 +12,7 @@ from filtercake.study.config.study import Study
 
 with job(snakemake.log[0], snakemake.output):
     study = Study.model_validate(snakemake.params.study)
-    csds = {Path(table).stem: from_table(pd.read_csv(table)) for table in snakemake.input.csds}
+    csds = read_tables(snakemake.input.csds)
     for output, table in (
         (snakemake.output.table1, table1(study, csds)),
         (snakemake.output.table2, table2(study, csds)),

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import TypeAdapter, ValidationError
 
 from filtercake.api.steps import PackingPorosity, porosity
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, from_table, to_table
+from filtercake.crystals.csd import FullAndTruncated, from_table, to_table
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
 from filtercake.packing.cloud import make_cloud
 from filtercake.packing.engines import ENGINES, SettleRequest
-from filtercake.packing.engines.liggghts import Liggghts, render
-from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
 from filtercake.packing.pack import MANIFEST, cloud_seed, pack
-from filtercake.packing.result import SettledState, read_record, write_json
-from filtercake.packing.scene import PackingSpec, stage_seed
+from filtercake.packing.result import read_record, write_json
+from filtercake.packing.scene import Scene, stage_seed
 from filtercake.packing.settling import StopRule
 from filtercake.run.provenance import ROOT, describe, packing_code
 from filtercake.study import engine_choice
@@ -44,7 +41,7 @@ class Exported:
     Attributes
     ----------
     folder : Path
-        Where it is.
+        Folder of the export.
     point : str
         Name of the point.
     replicate : int
@@ -57,27 +54,6 @@ class Exported:
     point: str
     replicate: int
     status: str
-
-
-class _Written(Exception):  # noqa: N818
-    """The engine's input is written, and nothing is to be run."""
-
-
-class _Deck(Liggghts):
-    """Writes the tuned deck and its cloud only."""
-
-    def _run(self, request: SettleRequest, values: dict[str, Any], expected: int | None) -> SettledState:  # noqa: ARG002
-        (request.folder / "packing.in").write_text(render(self.template, values), encoding="utf-8")
-        raise _Written
-
-
-class _PublishedDeck(LiggghtsAsPublished):
-    """Writes the deck of the paper's protocol only."""
-
-    _run = _Deck._run
-
-
-DECKS: dict[str, type[Liggghts]] = {Liggghts.name: _Deck, LiggghtsAsPublished.name: _PublishedDeck}
 
 
 def export(study: str, point: str, results: str | Path, output: str | Path, replicate: int | None = None) -> Exported:
@@ -94,7 +70,7 @@ def export(study: str, point: str, results: str | Path, output: str | Path, repl
     output : str or Path
         The folder, which must not exist.
     replicate : int, optional
-        Which packing; the first that failed, or 0, if left out.
+        Number of the packing; the first that failed, or 0, if left out.
 
     Raises
     ------
@@ -122,11 +98,6 @@ def export(study: str, point: str, results: str | Path, output: str | Path, repl
 def rerun(folder: str | Path) -> PackingPorosity:
     """Make an exported packing once more, in the folder ``rerun`` of the export.
 
-    Parameters
-    ----------
-    folder : str or Path
-        What :func:`export` wrote.
-
     Raises
     ------
     ConfigError
@@ -135,12 +106,12 @@ def rerun(folder: str | Path) -> PackingPorosity:
         If the packing fails, as it may have done before.
     """
     source = Path(folder) / INPUT
-    spec, csd, replicate = _read(source)
+    scene, replicate = _read(source)
     scratch = Path(folder) / RERUN
     shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir()
     npz = scratch / f"r{replicate}.npz"
-    pack(spec, csd, replicate, scratch).save(npz)
+    pack(scene, replicate, scratch).save(npz)
     return porosity(npz)
 
 
@@ -197,38 +168,35 @@ def _write(
     folder: Path, study: LoadedStudy, point: Point, replicate: int, outcome: dict[str, Any], sizes: FullAndTruncated
 ) -> None:
     full, csd = sizes
-    spec, seed = point.spec, cloud_seed(point.spec, csd, replicate)
+    scene = replace(point.scene, csd=csd)
+    seed = cloud_seed(scene, replicate)
     to_table(full, csd).to_csv(folder / "distribution.csv", index=False)
     found = {
         "study": study.name,
         "point": point.name,
         "replicate": replicate,
         "outcome": outcome,
-        "spec": spec.as_dict(),
-        "size_m": csd.size.tolist(),
-        "volume_fraction": csd.volume_fraction.tolist(),
-        "seeds": {"base": spec.seed, "cloud": seed, "engine": stage_seed(seed, "engine")},
-        "code": packing_code(spec.engine),
+        "scene": scene.as_dict(),
+        "seeds": {"base": scene.seed, "cloud": seed, "engine": stage_seed(seed, "engine")},
+        "code": packing_code(scene.engine),
     }
     write_json(folder / INPUT, found)
-    write_json(folder / "versions.json", {**describe(ROOT), "engine": _engine_words(spec.engine)})
+    write_json(folder / "versions.json", {**describe(ROOT), "engine": _engine_words(scene.engine)})
     shutil.copyfile(study.path, folder / "study.yaml")
-    problem = _write_scene(folder, spec, csd, seed)
-    (folder / "README.md").write_text(_readme(found, problem), encoding="utf-8")
+    problem = _write_input(folder, scene, seed)
+    inputs = [name for name in ENGINES[scene.engine].evidence if (folder / name).is_file()]
+    (folder / "README.md").write_text(_readme(found, inputs, problem), encoding="utf-8")
 
 
-def _write_scene(folder: Path, spec: PackingSpec, csd: CrystalSizeDistribution, seed: int) -> str:
-    """Write the cloud, and the deck where the engine has one; say why not where that fails."""
+def _write_input(folder: Path, scene: Scene, seed: int) -> str:
+    """Write the cloud, and what the engine reads; say why not where that fails."""
     try:
-        cloud = make_cloud(csd, spec.particles, spec.initial_void_fraction, seed, spec.bed_depth_factor)
+        cloud = make_cloud(scene.csd, scene.particles, scene.initial_void_fraction, seed, scene.bed_depth_factor)
         with (folder / "cloud.npz").open("wb") as stream:
             np.savez(stream, position=cloud.position, radius=cloud.radius, length=cloud.length, height=cloud.height)
-        if spec.engine in DECKS:
-            rule = StopRule.for_bed(spec, cloud.length)
-            request = SettleRequest(spec, csd, cloud, rule, stage_seed(seed, "engine"), folder, lambda _: None)
-            DECKS[spec.engine]().settle(request)
-    except _Written:
-        pass
+        rule = StopRule.for_bed(scene, cloud.length)
+        request = SettleRequest(scene, cloud, rule, stage_seed(seed, "engine"), folder, lambda _: None)
+        ENGINES[scene.engine]().write_input(request)
     except FiltercakeError as error:  # a cloud that cannot be made is what the report is about
         return str(error)
     return ""
@@ -253,8 +221,8 @@ def _copy(made: Path, point: str, replicate: int, target: Path) -> None:
             shutil.copyfile(path, copy)
 
 
-def _readme(found: dict[str, Any], problem: str) -> str:
-    engine, outcome = found["spec"]["engine"], found["outcome"]
+def _readme(found: dict[str, Any], inputs: list[str], problem: str) -> str:
+    outcome, by_hand = found["outcome"], ENGINES[found["scene"]["engine"]].by_hand
     lines = [
         f"# {found['study']}: {found['point']}, replicate {found['replicate']}",
         "",
@@ -267,44 +235,36 @@ def _readme(found: dict[str, Any], problem: str) -> str:
         "",
         "It goes to `rerun/`, beside the engine's own files, and its porosity is printed.",
     ]
-    if engine in DECKS and not problem:
-        lines += ["The deck alone, without filtercake: `liggghts -echo screen -in packing.in`."]
+    if inputs:
+        lines += [f"The engine's input alone, without filtercake: `{by_hand}`."]
     lines += [
         "",
         "| file | holds |",
         "|---|---|",
-        f"| `{INPUT}` | all that decides the packing (SI units): material, time step, sizes, seeds |",
+        f"| `{INPUT}` | all that decides the packing (SI units): sizes, material, time step, seeds |",
         "| `versions.json` | versions and machine |",
         "| `study.yaml`, `distribution.csv` | the study; the size distribution, whole and as packed |",
         "| `cloud.npz` | the spheres before settling: position, radius, box (m) |",
-        *(["| `packing.in`, `cloud.data` | the LIGGGHTS deck and its data |"] if engine in DECKS else []),
+        *([f"| {', '.join(f'`{name}`' for name in inputs)} | what the engine reads |"] if inputs else []),
         "| `as_run/` | what the results hold: packing and record, log, and the engine's output where it failed |",
     ]
     return "\n".join(lines) + "\n"
 
 
-def _read(source: Path) -> tuple[PackingSpec, CrystalSizeDistribution, int]:
-    """Read an export's input; it may come from anyone, so every value is checked for its type."""
+def _read(source: Path) -> tuple[Scene, int]:
+    """Read an export's input; it may come from anyone, so every value is checked."""
     try:
         if source.stat().st_size > LARGEST_INPUT:
             raise ValueError("is too large")
         values = json.loads(source.read_text(encoding="utf-8"))
-        spec = TypeAdapter(PackingSpec).validate_python(values["spec"])
-        replicate = int(values["replicate"])
-        csd = CrystalSizeDistribution.from_classes(values["size_m"], values["volume_fraction"])
+        scene, replicate = Scene.from_dict(values["scene"]), int(values["replicate"])
     except OSError as error:
         raise _unusable(source, f"cannot be read: {error.strerror}") from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise _unusable(source, f"spec.{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
     except (FiltercakeError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise _unusable(source, f"is not an exported packing ({type(error).__name__}: {error})") from None
-    if not 0 <= replicate < MOST_REPLICATES or spec.engine not in ENGINES:
+    if not 0 <= replicate < MOST_REPLICATES or scene.engine not in ENGINES:
         raise _unusable(source, "is not an exported packing (replicate or engine)")
-    # not through from_classes' normalisation: the last digits decide the seed
-    exact = np.array(values["size_m"], dtype=np.float64), np.array(values["volume_fraction"], dtype=np.float64)
-    same = exact[0].shape == csd.size.shape and bool((exact[0] == csd.size).all())
-    return spec, CrystalSizeDistribution(*exact) if same else csd, replicate
+    return scene, replicate
 
 
 def _unusable(source: Path, text: str) -> ConfigError:

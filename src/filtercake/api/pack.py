@@ -12,13 +12,11 @@ from typing import Any
 import pandas as pd
 
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
 from filtercake.errors import ConfigError, PackingRejected, Problem
-from filtercake.packing.pack import MANIFEST, Outcome, pack_replicates, point_key
+from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates, point_key
 from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.result import Packing as SettledPacking
 from filtercake.packing.result import read_sealed, write_json
-from filtercake.results.replicates import REPLICATE_COLUMNS, failed_row, replicate_row, summarise
+from filtercake.results.replicates import REPLICATE_COLUMNS, replicate_rows, summarise
 from filtercake.run.provenance import packing_code, versions
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
@@ -28,8 +26,6 @@ from filtercake.units import MICROSECOND
 SUMMARY = "summary.json"
 _OWN = re.compile(rf"r\d+\..*|\.r\d+\..*|\.work|{re.escape(MANIFEST)}|{re.escape(SUMMARY)}")
 """Names that packings and their records have."""
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -46,9 +42,9 @@ class Bed:
     files : tuple of Path
         The accepted packings.
     failures : tuple of str
-        Why others were not.
+        Reasons of the failed packings.
     warnings : tuple of str
-        What is allowed but doubtful about the arguments.
+        Doubts about allowed arguments.
     """
 
     summary: dict[str, Any]
@@ -59,7 +55,7 @@ class Bed:
 
 
 def pack(
-    source: Distribution, folder: str | Path, *, say: Say = lambda _: None, replace: bool = False, **options: Any
+    source: Distribution, folder: str | Path, *, say: Report = lambda _: None, replace: bool = False, **options: Any
 ) -> Bed:
     """Pack spheres of a size distribution, and measure porosity and resistance.
 
@@ -73,7 +69,7 @@ def pack(
     folder : str or Path
         Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
     say : callable
-        Takes a line about each packing as it comes.
+        Receives a line per packing.
     replace : bool
         Whether packings of other options, or of another version of the program, may be lost; an error otherwise.
     **options
@@ -94,12 +90,12 @@ def pack(
     point = base_point(study, name, engine_choice.choose)
     csd = study.csds[name]
     # a resistance beyond floating point is found before the packings are made, not after
-    resistance(source, porosity=0.01, density_kg_m3=point.spec.density, sphericity=study.model.material.sphericity)
+    resistance(source, porosity=0.01, density_kg_m3=point.scene.density, sphericity=study.model.material.sphericity)
     if not replace:
-        _check_packings(path, point_key(packing_code(point.spec.engine), point.spec, csd.truncated))
-    outcomes = _make(point, csd.truncated, path, say)
+        _check_packings(path, point_key(packing_code(point.scene.engine), point.scene))
+    outcomes = _make(point, path, say)
     sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
-    rows = [_row(point, outcome, path, sizes, sphericity) for outcome in outcomes]
+    rows = list(replicate_rows(point, outcomes, path, sizes, sphericity))
     table = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
     summary = _summary(table, point)
     write_json(path / SUMMARY, {**summary, "versions": versions()})
@@ -112,24 +108,18 @@ def pack(
     )
 
 
-def _make(point: Point, csd: CrystalSizeDistribution, folder: Path, say: Say) -> list[Outcome]:
+def _make(point: Point, folder: Path, say: Report) -> list[Outcome]:
     def report(outcome: Outcome, record: dict[str, Any]) -> None:
         if outcome.status == "ok":
             say(f"r{outcome.replicate}: {record['steps']:,} steps, {record['wall_s']:.1f} s")
         else:
             say(f"r{outcome.replicate} failed: {outcome.reason}")
 
-    interval, code = point.porosity_ci95_target, packing_code(point.spec.engine)
+    interval, code = point.porosity_ci95_target, packing_code(point.scene.engine)
     enough: Callable[[Path], bool] = lambda _: False  # noqa: E731 - the other branch is an object
     if interval is not None:
-        enough = UntilNarrow(point.spec, interval, point.replicates)
-    return pack_replicates(point.spec, csd, point.most_replicates, folder, code, report, say, enough)
-
-
-def _row(point: Point, outcome: Outcome, folder: Path, sizes: FullAndTruncated, sphericity: float) -> dict[str, Any]:
-    if outcome.status != "ok":
-        return failed_row(point, outcome, outcome.reason)
-    return replicate_row(point, SettledPacking.load(folder / f"r{outcome.replicate}.npz"), sizes, sphericity)
+        enough = UntilNarrow(point.scene, interval, point.replicates)
+    return pack_replicates(point.scene, point.most_replicates, folder, code, report, say, enough)
 
 
 def _summary(table: pd.DataFrame, point: Point) -> dict[str, Any]:
@@ -139,8 +129,12 @@ def _summary(table: pd.DataFrame, point: Point) -> dict[str, Any]:
     for name, value in plain.items():
         if isinstance(value, float) and not math.isfinite(value):
             plain[name] = None
-    bed = {"particles": point.spec.particles, "bed_depth_factor": point.spec.bed_depth_factor, "seed": point.spec.seed}
-    return {**plain, **bed, "density_kg_m3": point.spec.density, "time_step_us": point.spec.time_step / MICROSECOND}
+    bed = {
+        "particles": point.scene.particles,
+        "bed_depth_factor": point.scene.bed_depth_factor,
+        "seed": point.scene.seed,
+    }
+    return {**plain, **bed, "density_kg_m3": point.scene.density, "time_step_us": point.scene.time_step / MICROSECOND}
 
 
 def _check_folder(folder: Path) -> None:

@@ -17,31 +17,25 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from filtercake.crystals.crystallizer import SteadyState
-from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.errors import ConfigError, FilterError, PackingRejected, Problem
-from filtercake.filtration.drum_filter import (
-    DrumFilter,
-    area,
-    cake_mass_per_area,
-    cake_thickness,
-    capacity,
-    medium_share,
-)
+from filtercake.crystals.csd import CrystalSizeDistribution, kept_volume
+from filtercake.errors import ConfigError, CsdError, FilterError, PackingRejected, Problem
+from filtercake.filtration.drum_filter import area, cake_mass_per_area, cake_thickness, capacity, medium_share
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman, log_sensitivity
 from filtercake.packing.cloud import NARROW_PARTICLES
 from filtercake.packing.porosity import measure, porosity_profile
 from filtercake.packing.result import Packing
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.slab import bed_height
+from filtercake.results.filter_design import drum_filter
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.values import TO_NUMBER, Density, Model
 from filtercake.study.loading import LoadedStudy, check_study, parse
-from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
+from filtercake.units import HOUR, MICROMETRE
 
 ORIGIN = Path("options")
 """Stands for the study file in messages about arguments; files that arguments name are looked up from here."""
 CSD = "csd"
-"""Name of the one distribution."""
+"""Name of the distribution in the study of one point."""
 CRYSTALLIZER_OPTIONS = ("kinetics", "kinetics_file", "slurry_concentration_kg_m3", "bin_width_um")
 PLAIN_DENSITY = 1000.0
 """Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it, or from the spheres
@@ -78,7 +72,7 @@ class Distribution:
     @property
     def kept_volume_fraction(self) -> float:
         """Share of the crystal volume that is packed."""
-        return float(self.full.volume_fraction[np.isin(self.full.size, self.truncated.size)].sum())
+        return kept_volume(self.full, self.truncated)
 
 
 @dataclass(frozen=True)
@@ -142,7 +136,7 @@ class PackingPorosity:
     particles : int
         Number of spheres.
     engine : str
-        What settled them.
+        Name of the engine.
     """
 
     porosity: float
@@ -265,9 +259,8 @@ def filter_area(**options: Any) -> FilterSize:
     Parameters
     ----------
     **options
-        The keys of the configuration's ``filter`` block; ``resistance_m_kg``, ``slurry_concentration_kg_m3``;
-        exactly one of ``slurry_flow_m3_h`` and ``filter_area_m2``; ``porosity`` and ``density_kg_m3`` for the cake's
-        thickness.
+        The keys of the configuration's ``filter`` block; ``resistance_m_kg``, ``slurry_concentration_kg_m3``; exactly
+        one of ``slurry_flow_m3_h`` and ``filter_area_m2``; ``porosity`` and ``density_kg_m3`` for the cake's thickness.
 
     Raises
     ------
@@ -286,21 +279,16 @@ def filter_area(**options: Any) -> FilterSize:
 
 
 def porosity(npz: str | Path) -> PackingPorosity:
-    """Measure a packing's porosity.
-
-    Parameters
-    ----------
-    npz : str or Path
-        The packing; its record (``.json``) lies beside it.
+    """Measure a packing's porosity; its record (``.json``) lies beside the ``npz`` file.
 
     Raises
     ------
     PackingRejected
         If a file is missing, damaged, not what was accepted, or the bed has no interior.
     """
-    packing, spec = load_packing(Path(npz))
+    packing, scene = load_packing(Path(npz))
     try:
-        found = measure(packing, spec)
+        found = measure(packing, scene)
     except ValueError as error:
         raise PackingRejected([f"{npz}: {error}; use more particles"]) from None
     return PackingPorosity(
@@ -312,29 +300,14 @@ def porosity(npz: str | Path) -> PackingPorosity:
         interior_to_um=found.slab.upper / MICROMETRE,
         bed_height_um=bed_height(packing.position, packing.radius) / MICROMETRE,
         particles=int(packing.radius.size),
-        engine=spec.engine,
+        engine=scene.engine,
     )
 
 
 def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> pd.DataFrame:
     """Tabulate a packing's porosity over height, in exact slices from the floor to the topmost sphere.
 
-    Parameters
-    ----------
-    npz : str or Path
-        The packing.
-    slices_per_diameter : int
-        Slices in one largest diameter.
-
-    Returns
-    -------
-    DataFrame
-        Columns height_um (of a slice's middle) and porosity.
-
-    Raises
-    ------
-    PackingRejected
-        As for :func:`porosity`.
+    The columns are height_um (of a slice's middle) and porosity; errors are those of :func:`porosity`.
     """
     packing, _ = load_packing(Path(npz))
     top = float((packing.position[:, 2] + packing.radius).max())
@@ -344,7 +317,7 @@ def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> 
     return pd.DataFrame({"height_um": 0.5 * (edges[1:] + edges[:-1]) / MICROMETRE, "porosity": values})
 
 
-def load_packing(npz: Path) -> tuple[Packing, PackingSpec]:
+def load_packing(npz: Path) -> tuple[Packing, Scene]:
     """Read a packing and what it is made of, and make sure that it is one.
 
     Raises
@@ -359,23 +332,20 @@ def load_packing(npz: Path) -> tuple[Packing, PackingSpec]:
     except PackingRejected as error:
         raise PackingRejected([f"{npz.parent}: {error}"]) from None
     try:
-        spec = PackingSpec.from_dict(packing.diagnostics["spec"])
-    except (KeyError, TypeError):
-        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed"]) from None
+        scene = Scene.from_dict(packing.diagnostics["scene"])
+    except KeyError:
+        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed (no scene)"]) from None
+    except (CsdError, OverflowError, TypeError, ValueError) as error:
+        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed: {error}"]) from None
     n = packing.radius.size
     sound = n > 0 and packing.radius.shape == (n,) and packing.position.shape == (n, 3) and packing.length > 0.0
     if not (sound and np.isfinite(packing.position).all() and (packing.radius > 0.0).all()):
         raise PackingRejected([f"{npz} does not hold a packing"])
-    return packing, spec
+    return packing, scene
 
 
 def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mapping[str, Any]) -> LoadedStudy:
-    """Check a study of one point.
-
-    Parameters
-    ----------
-    source, material, packing : mapping
-        Arguments of :func:`distribution`, and those of the configuration's blocks.
+    """Check a study of one point: the arguments of :func:`distribution`, and the blocks ``material`` and ``packing``.
 
     Raises
     ------
@@ -416,7 +386,7 @@ def _distribution(study: LoadedStudy, options: dict[str, Any]) -> Distribution:
 
 
 def _source_problems(source: Mapping[str, Any]) -> Sequence[Problem]:
-    """Find what a distribution lacks or has too much of."""
+    """Missing, surplus and contradictory arguments of a distribution."""
     known = ("mixture", "file", "residence_time_min", *CRYSTALLIZER_OPTIONS)
     cuts = ("truncate_below_volume_fraction", "truncate_below_um", "truncate_above_um")
     problems = [
@@ -457,7 +427,7 @@ def _check_sums(study: LoadedStudy) -> None:
 
 
 def _size(given: FilterOptions) -> FilterSize:
-    drum, alpha = _drum(given), given.resistance_m_kg
+    drum, alpha = drum_filter(given, given.slurry_concentration_kg_m3), given.resistance_m_kg
     thickness = None
     if given.porosity is not None and given.density_kg_m3 is not None:
         thickness = float(cake_thickness(drum, alpha, given.porosity, given.density_kg_m3)) / MILLIMETRE
@@ -473,17 +443,6 @@ def _size(given: FilterOptions) -> FilterSize:
         medium_share=float(medium_share(drum, alpha)),
         cake_mass_kg_m2=float(cake_mass_per_area(drum, alpha)),
         cake_thickness_mm=thickness,
-    )
-
-
-def _drum(given: FilterOptions) -> DrumFilter:
-    return DrumFilter(
-        pressure_drop=given.pressure_drop_kPa * KILOPASCAL,
-        submerged_fraction=given.submerged_fraction,
-        rotation_rate=given.rotation_rate_rpm / MINUTE,
-        medium_resistance=given.medium_resistance_1_m,
-        viscosity=given.viscosity_mPa_s * MILLIPASCAL_SECOND,
-        slurry_concentration=given.slurry_concentration_kg_m3,
     )
 
 

@@ -53,7 +53,7 @@ MOST_FRICTIONS = 50
 
 
 class CohesionRange(Model):
-    """Where the cohesion is looked for."""
+    """Range of cohesions that are tried."""
 
     low: Cohesion = Field(default=0.0, description="Lowest cohesion energy density, kJ/m3.")
     high: Cohesion = Field(default=100.0, description="Highest cohesion energy density, kJ/m3.")
@@ -82,7 +82,7 @@ class Calibration(Model):
     study: PathText = Field(description="Study whose distributions, material and packing hold: a name or a path.")
     measurements: PathText = Field(description="YAML with the measurements; path relative to this file.")
     cohesion_kJ_m3: CohesionRange = Field(  # noqa: N815
-        default=CohesionRange(), description="Where the cohesion is looked for."
+        default=CohesionRange(), description="Range of cohesions that are tried."
     )
     pressure_kPa: Pressure | None = Field(  # noqa: N815
         default=None,
@@ -144,17 +144,15 @@ class LoadedCalibration:
     study : LoadedStudy
         The study, under the calibration's name and with its replicates and warnings.
     measurements : Measurements
-        What was measured.
+        Contents of the file of measurements.
     observations : tuple of Observation
-        The same as the fit takes it.
+        Measurements as the fit takes them.
     doubts : tuple of Finding
-        What must be known of the measurements before believing any fit.
+        Doubts about the measurements.
     implied_porosity : float
         Mean porosity that the measured resistances imply.
     frictions : tuple of float
         Those packed: one and its rivals, or all that the fit of the friction needs.
-    warnings : tuple of str
-        What is allowed but doubtful.
     """
 
     name: str
@@ -166,7 +164,11 @@ class LoadedCalibration:
     doubts: tuple[Finding, ...]
     implied_porosity: float
     frictions: tuple[float, ...]
-    warnings: tuple[str, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed but doubtful."""
+        return self.study.warnings
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -217,7 +219,7 @@ def load_calibrations(names: Iterable[str], folder: Path, studies: Path, file: s
 
 
 def _path_problem(path: Path, same: Path | None, folder: Path) -> str:
-    """Say what is wrong with the path of a calibration; ``same`` is another of its name. Empty where all is well."""
+    """Message about an invalid path of a calibration, or one of the same name (``same``); empty for a valid one."""
     if not NAME.match(path.stem):
         return "the file's name must be letters, digits, - and _, starting with a letter or digit, at most 64 long"
     if not is_file(path):
@@ -229,14 +231,7 @@ def _path_problem(path: Path, same: Path | None, folder: Path) -> str:
 
 
 def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
-    """Read and check a calibration, its study and its measurements.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    studies : Path
-        Folder where studies are looked up by name.
+    """Read and check a calibration, its study (looked up by name in ``studies``) and its measurements.
 
     Raises
     ------
@@ -269,7 +264,6 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
         doubts=tuple(_measured_doubts(measurements, model.pressure_kPa)),
         implied_porosity=porosity,
         frictions=_frictions(model, porosity, len({item.csd for item in observations})),
-        warnings=warnings,
     )
 
 

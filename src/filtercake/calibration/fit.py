@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage, optimize, special
+import scipy
+from scipy import special
 
 from filtercake.calibration.pooling import Pool, improbable, pool
 from filtercake.errors import CalibrationError
@@ -372,14 +373,14 @@ def _misfit(residual: FloatArray, groups: _Groups, freedom: int) -> tuple[float,
     if not improbable(chi_square, freedom):
         return chi_square, 0.0
     widest = float(np.sqrt(np.mean(residual**2, axis=0).min() * len(groups.names) / freedom))
-    return chi_square, float(optimize.brentq(lambda d: least(d) - freedom, 0.0, 1.01 * widest + 1e-9))
+    return chi_square, float(scipy.optimize.brentq(lambda d: least(d) - freedom, 0.0, 1.01 * widest + 1e-9))
 
 
 def _profile(parameter: Parameter, axis: FloatArray, deviance: FloatArray, number: int, threshold: float) -> Estimate:
     others = tuple(k for k in range(deviance.ndim) if k != number)
     profile = deviance.min(axis=others) if others else deviance
     inside = profile <= threshold
-    _, regions = ndimage.label(inside)
+    _, regions = scipy.ndimage.label(inside)
     best = int(np.argmin(profile))
     low, high = np.flatnonzero(inside)[[0, -1]]
     return Estimate(

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import optimize, special
+from scipy import special
 
 from filtercake.units import FloatArray
 
@@ -72,7 +73,7 @@ def scatter(values: ArrayLike, errors: ArrayLike) -> float:
     # the squares fall as the scatter grows, and are below the degrees of freedom once it is the whole spread
     widest = 1.01 * float(np.ptp(value))
     return float(
-        optimize.brentq(lambda added: _squares(value, np.hypot(error, added)) - freedom, 0.0, widest, rtol=1e-12)
+        scipy.optimize.brentq(lambda added: _squares(value, np.hypot(error, added)) - freedom, 0.0, widest, rtol=1e-12)
     )
 
 

@@ -27,7 +27,7 @@ from filtercake.calibration.fit import (
     pooled,
     predict,
 )
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, from_table
+from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, read_tables
 from filtercake.errors import CalibrationError
 from filtercake.filtration.drum_filter import DrumFilter, area
 from filtercake.filtration.resistance import implied_porosity, kozeny_carman
@@ -47,14 +47,14 @@ CURVE_POINTS = 101
 
 @dataclass(frozen=True)
 class Settings:
-    """What a calibration's jobs need to know.
+    """Settings of a calibration's jobs.
 
     Attributes
     ----------
     parameters : tuple of Parameter
         The fitted ones.
     frictions : tuple of float
-        Those packed; where the friction is not fitted, the first is the one taken and the rest are its rivals.
+        Frictions of the packings; unless the friction is fitted, the first is the one taken, the rest its rivals.
     measured, predicted : tuple of str
         Distributions with measurements, and those whose resistance is predicted.
     cohesions : tuple of float
@@ -62,17 +62,17 @@ class Settings:
     estimator : {"interior", "paper_count"}
         Porosity that the measured resistance is held against.
     rounds : int
-        At most so many rounds of packings.
+        Largest number of rounds of packings.
     relative_ci95_target : float
         Half-width of the cohesion's interval over its value that ends them.
     density, sphericity : float
-        Of the crystals, kg/m3 and 1.
+        Density (kg/m3) and sphericity of the crystals.
     implied_porosity : float
         Mean porosity that the measured resistances imply.
     soft_above : float
         Cohesion from which the softness of the contacts matters, kJ/m3.
     doubts : tuple of Finding
-        What must be known of the measurements themselves.
+        Doubts about the measurements.
     """
 
     parameters: tuple[Parameter, ...]
@@ -109,6 +109,11 @@ class Settings:
         return len(self.parameters) > 1
 
     @property
+    def fixed_friction(self) -> float | None:
+        """Coefficient of friction of the fit that counts; None where it is fitted."""
+        return None if self.fits_friction else self.frictions[0]
+
+    @property
     def main_frictions(self) -> tuple[float, ...]:
         """Frictions of the fit that counts, without rivals."""
         return self.frictions if self.fits_friction else self.frictions[:1]
@@ -129,7 +134,7 @@ class Round:
     Attributes
     ----------
     points : tuple of str
-        What to pack.
+        Names of the points to pack.
     finished : bool
         Whether it is the last: then there is nothing to pack.
     why : str
@@ -154,7 +159,7 @@ class Outcome:
     left_out : dict of str to float
         Error of predicting each distribution from the others, in ln(alpha).
     findings : tuple of Finding
-        What a user must know.
+        Findings about the fit.
     responses : dict of (str, float or None) to Response
         ln(alpha) by distribution and fixed friction (None where it is fitted).
     """
@@ -168,7 +173,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Task:
-    """What a calibration's job is given: its settings, measurements and candidates."""
+    """Input of a calibration's job."""
 
     settings: Settings
     observations: tuple[Observation, ...]
@@ -187,16 +192,11 @@ class Task:
         """Tabulate the packings of the points named (see :func:`simulate`); ``tables`` are the CSD files."""
         wanted = set(names)
         chosen = [c for c in self.candidates if c.point.name in wanted]
-        return simulate(chosen, packings, read_csds(tables), self.settings)
+        return simulate(chosen, packings, read_tables(tables), self.settings)
 
     def full_csds(self, tables: Iterable[str]) -> dict[str, CrystalSizeDistribution]:
         """Read the full distributions from their files, by name."""
-        return {name: full for name, (full, _) in read_csds(tables).items()}
-
-
-def read_csds(tables: Iterable[str]) -> dict[str, FullAndTruncated]:
-    """Read the distributions, full and truncated, from their files, by name."""
-    return {Path(table).stem: from_table(pd.read_csv(table)) for table in tables}
+        return {name: full for name, (full, _) in read_tables(tables).items()}
 
 
 def simulate(
@@ -207,10 +207,7 @@ def simulate(
 ) -> pd.DataFrame:
     """Tabulate every packing made, with its ln(alpha) by the estimator asked for.
 
-    Returns
-    -------
-    DataFrame
-        The rows of :func:`filtercake.results.replicates.replicates_table` with the columns batch and ln_resistance.
+    The columns are those of :func:`filtercake.results.replicates.replicates_table`, batch and ln_resistance.
     """
     listed = list(candidates)
     table = replicates_table([c.point for c in listed], packings, csds, settings.sphericity)
@@ -234,25 +231,10 @@ def choose_round(
     observations: Sequence[Observation],
     simulated: pd.DataFrame | None,
 ) -> Round:
-    """Decide what to pack next.
+    """Decide what to pack in a round (numbered from 0), given the points of earlier rounds and what they gave.
 
     The first round is coarse. Later ones refine the cohesion where the interval still is, and, when every candidate
     there has been packed, add a batch of replicates.
-
-    Parameters
-    ----------
-    number : int
-        Of the round, from 0.
-    settings : Settings
-        Of the calibration.
-    candidates : sequence of Candidate
-        All points there may be.
-    visited : sequence of str
-        Points of earlier rounds.
-    observations : sequence of Observation
-        What was measured.
-    simulated : DataFrame or None
-        What was packed (see :func:`simulate`); None before the first round.
     """
     own = [c for c in candidates if c.point.csd in settings.measured]
     if number == 0 or simulated is None:
@@ -294,7 +276,7 @@ def _named(
         for c in candidates
         if c.batch == batch
         and np.isclose(cohesions, _cohesion(c)).any()
-        and np.isclose(frictions, c.point.spec.friction).any()
+        and np.isclose(frictions, c.point.scene.friction).any()
     )
 
 
@@ -354,7 +336,7 @@ def fit_main(settings: Settings, observations: Sequence[Observation], simulated:
 
 
 def _main_responses(settings: Settings, simulated: pd.DataFrame) -> dict[str, Response]:
-    friction = None if settings.fits_friction else settings.frictions[0]
+    friction = settings.fixed_friction
     responses = responses_at(settings, simulated, settings.measured, friction)
     shortage = _shortage(settings.measured, responses, simulated, friction)
     if shortage:
@@ -365,7 +347,7 @@ def _main_responses(settings: Settings, simulated: pd.DataFrame) -> dict[str, Re
 def _shortage(
     wanted: Sequence[str], found: Mapping[str, Response], simulated: pd.DataFrame, friction: float | None
 ) -> str:
-    """Say which distributions have too few accepted packings for a smooth model, and how many; empty if none."""
+    """Distributions with too few accepted packings for a smooth model, in words; empty if none."""
     rows = simulated if friction is None else simulated[np.isclose(simulated["friction"], friction)]
     counts = []
     for name in [name for name in wanted if name not in found]:
@@ -387,9 +369,7 @@ def conclude(settings: Settings, observations: Sequence[Observation], simulated:
     """
     main = _main_responses(settings, simulated)
     fit = calibrate(observations, main)
-    by_friction: dict[float | None, dict[str, Response]] = {
-        None if settings.fits_friction else settings.frictions[0]: main
-    }
+    by_friction: dict[float | None, dict[str, Response]] = {settings.fixed_friction: main}
     rivals = {} if settings.fits_friction else {settings.frictions[0]: fit}
     skipped = []
     for mu in () if settings.fits_friction else settings.frictions[1:]:
@@ -413,7 +393,7 @@ def conclude(settings: Settings, observations: Sequence[Observation], simulated:
 
 
 def _untested(settings: Settings) -> tuple[Finding, ...]:
-    """Say where the measurements have no say in the friction."""
+    """Return the finding that the measurements cannot test the friction, where they cannot."""
     if len(settings.measured) > 1 or len(settings.frictions) > 1:
         return ()
     text = f"one measured distribution cannot test the friction taken, {settings.frictions[0]:g}: a cohesion makes up"
@@ -421,7 +401,7 @@ def _untested(settings: Settings) -> tuple[Finding, ...]:
 
 
 def _advice(settings: Settings, fit: Calibration) -> tuple[Finding, ...]:
-    """Say where the friction taken is not the paper's advice for the measured cakes."""
+    """Return the finding that the friction taken is not the one the paper advises, where it is not."""
     advised = advised_friction(settings.implied_porosity)
     taken = fit.best[1] if settings.fits_friction else settings.frictions[0]
     if settings.fits_friction or np.isclose(taken, advised):
@@ -452,7 +432,7 @@ def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
             e.parameter.name: {"value": e.value, "low": e.low, "high": e.high, "regions": e.regions}
             for e in fit.estimates
         },
-        "friction": None if settings.fits_friction else settings.frictions[0],
+        "friction": settings.fixed_friction,
         "chi_square": fit.chi_square,
         "degrees_of_freedom": fit.degrees_of_freedom,
         "discrepancy": fit.discrepancy,
@@ -480,7 +460,7 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
     ``left_out_m_kg`` is the resistance that the other distributions predict for this one; ``left_out_ln_error`` its
     error, in ln(alpha), against the weighted mean of the distribution's measurements.
     """
-    friction = None if settings.fits_friction else settings.frictions[0]
+    friction = settings.fixed_friction
     means = pooled(observations)
     rows = []
     for item in observations:
@@ -553,25 +533,21 @@ def prediction_table(
 
     Parameters
     ----------
-    outcome : Outcome
+    outcome, settings : Outcome, Settings
         The calibration.
-    settings : Settings
-        Its settings.
     simulated : DataFrame
         Packings of the distributions to predict (see :func:`simulate`).
     csds : mapping of str to CrystalSizeDistribution
         The full distributions.
-    drum : DrumFilter or None
-        Filter whose area is wanted.
-    slurry_flow : float
-        Slurry that it must take, m3/s.
+    drum, slurry_flow : DrumFilter or None, float
+        Filter whose area is wanted, and the slurry that it must take, m3/s.
 
     Raises
     ------
     CalibrationError
         If a distribution has not enough packings.
     """
-    friction = None if settings.fits_friction else settings.frictions[0]
+    friction = settings.fixed_friction
     responses = responses_at(settings, simulated, settings.predicted, friction)
     shortage = _shortage(settings.predicted, responses, simulated, friction)
     if shortage:

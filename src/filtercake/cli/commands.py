@@ -57,17 +57,10 @@ EXAMPLES = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command.
+    """Run a command, by default with the arguments of the process.
 
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        The arguments; those of the process if left out.
-
-    Returns
-    -------
-    int
-        Exit status: 0 where all went well, 1 where no packing was accepted, 2 where the command or its input is wrong.
+    The exit status is 0 where all went well, 1 where no packing was accepted, 2 where the command or its input is
+    wrong.
     """
     parser = build_parser()
     options = argparse.Namespace()
@@ -378,8 +371,7 @@ def _run_estimate(options: argparse.Namespace) -> int:
         raise words.UsageError(f"--cores = {asked}: must be a whole number, from 1")
     study = load_study(Path(options.study))
     points = expand(study, engine_choice.choose)
-    csds = {name: csd.truncated for name, csd in study.csds.items()}
-    found = estimate(points, csds, on_cluster=options.cluster)
+    found = estimate(points, on_cluster=options.cluster)
     wall = found.wall_seconds(int(asked))
     if options.json:
         return _print_json({**asdict(found), "wall_seconds": wall})

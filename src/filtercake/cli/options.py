@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NoReturn
@@ -13,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from filtercake.api.steps import ORIGIN
 from filtercake.cli.schema import allowed, meaning
-from filtercake.errors import ConfigError, FiltercakeError, Problem
+from filtercake.errors import ConfigError, FiltercakeError, Problem, did_you_mean
 from filtercake.study.config.crystals import Crystallizer, Csd
 
 SOURCE_FIELDS: tuple[tuple[type[BaseModel], tuple[str, ...]], ...] = (
@@ -39,7 +38,7 @@ class UsageError(FiltercakeError):
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, without the usage text."""
+    """Reports errors in one line, without the usage text."""
 
     def __init__(self, **settings: Any):
         settings.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
@@ -65,11 +64,10 @@ def add_field(group: argparse._ArgumentGroup, name: str, field: FieldInfo, text:
     group.add_argument(*names, dest=name, metavar=_metavar(range_), help=_escape(_help(name, field, range_, text)))
 
 
-def add_model(group: argparse._ArgumentGroup, model: type[BaseModel], leave_out: Iterable[str] = ()) -> None:
+def add_model(group: argparse._ArgumentGroup, model: type[BaseModel]) -> None:
     """Add an option for every key of a part of the configuration."""
     for name, field in model.model_fields.items():
-        if name not in leave_out:
-            add_field(group, name, field)
+        add_field(group, name, field)
 
 
 def add_source(parser: argparse.ArgumentParser) -> None:
@@ -99,7 +97,7 @@ def source(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def in_words(error: FiltercakeError, known: Iterable[str]) -> str:
-    """Say an error in one line, with options where it names keys of the configuration."""
+    """Text of an error in one line, with options in place of keys of the configuration."""
     if isinstance(error, UsageError):
         return str(error)
     names = set(known)
@@ -116,10 +114,9 @@ def with_flags(text: str, known: Iterable[str]) -> str:
 
 
 def unknown(words: list[str], known: Iterable[str]) -> str:
-    """Say that words are no options, and what may have been meant."""
+    """Message about unknown options, with the nearest known one."""
     word = words[0].partition("=")[0]
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"unknown argument {words[0]!r}" + (f"; did you mean {close[0]}?" if close else "")
+    return f"unknown argument {words[0]!r}{did_you_mean(word, known)}"
 
 
 def _problem_in_words(problem: Problem, known: set[str]) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel
+from pydantic import BaseModel, WithJsonSchema
 from pydantic.fields import FieldInfo
 
 from filtercake.calibration.config import Calibration, CohesionRange
@@ -161,7 +161,7 @@ def _widen(node: Any) -> Any:
 
 
 def meaning(field: FieldInfo) -> str:
-    """Say what a field is, in the words of the model."""
+    """Return the description of a field in the model."""
     return (field.description or "").strip()
 
 
@@ -193,9 +193,13 @@ def _example(key: str) -> str:
 
 
 def allowed(field: FieldInfo) -> str:
-    """Say what values a field takes, from its annotation and bounds."""
+    """Return the allowed values of a field, from its annotation and bounds."""
+    metadata = [*field.metadata, *_inner_metadata(field.annotation)]
+    for item in metadata:
+        if isinstance(item, WithJsonSchema) and item.json_schema:
+            return ", ".join(f"`{name}`" for name in item.json_schema["enum"])
     kinds = list(dict.fromkeys(_kinds(field.annotation)))
-    bounds = list(_bounds([*field.metadata, *_inner_metadata(field.annotation)]))
+    bounds = list(_bounds(metadata))
     return " ".join([" or ".join(kinds), *([", ".join(bounds)] if bounds else [])])
 
 

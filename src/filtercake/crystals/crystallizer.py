@@ -7,7 +7,6 @@ distribution. Nucleation rate B0 and growth rate G follow from the kinetics (eqs
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,11 +14,11 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import gammainc
 
 from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
-from filtercake.errors import ConfigError, CrystallizerError, Problem, shown
+from filtercake.errors import ConfigError, CrystallizerError, Problem, did_you_mean, shown
 from filtercake.units import MICROMETRE, MINUTE, FloatArray
 from filtercake.user_files import read_yaml
 
@@ -62,7 +61,7 @@ class Kinetics:
     density : float
         Crystal density, kg/m3; positive.
     source : str
-        Where the values are from.
+        Source of the values.
     residence_time_range : tuple of float or None
         Shortest and longest residence time the kinetics are meant for, s; None where the source states none.
 
@@ -129,11 +128,6 @@ class SteadyState:
     kinetics: str
 
     @property
-    def crystals_per_volume(self) -> float:
-        """Number of crystals per slurry volume, #/m3: ``B0 tau``."""
-        return self.nucleation_rate * self.residence_time
-
-    @property
     def number_mean(self) -> float:
         """Number mean size d10, m: ``G tau``."""
         return self.size_scale
@@ -188,46 +182,10 @@ def steady_state(kinetics: Kinetics, residence_time_s: float, slurry_concentrati
     return SteadyState(growth_rate, nucleation_rate, size_scale, residence_time, slurry_concentration, kinetics.name)
 
 
-def number_density(state: SteadyState, size: ArrayLike) -> FloatArray:
-    """Evaluate the number density b(L), #/(m3 m): ``(B0/G) exp(-L/(G tau))`` (paper eq. 11).
-
-    Parameters
-    ----------
-    state : SteadyState
-        The crystallizer.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    ndarray, shape (...)
-
-    Raises
-    ------
-    CrystallizerError
-        If a size is negative or not finite.
-    """
-    return np.asarray(state.nucleation_rate / state.growth_rate * np.exp(-_sizes(size) / state.size_scale))
-
-
 def volume_density(state: SteadyState, size: ArrayLike) -> FloatArray:
     """Evaluate the volume (= mass) density w(L), 1/m: ``L^3 exp(-L/a) / (6 a^4)`` with ``a = G tau``.
 
-    Parameters
-    ----------
-    state : SteadyState
-        The crystallizer.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    ndarray, shape (...)
-
-    Raises
-    ------
-    CrystallizerError
-        If a size is negative or not finite.
+    Sizes L in m, of any shape; a negative one or one that is not finite raises a CrystallizerError.
     """
     scaled = _sizes(size) / state.size_scale
     return np.asarray(scaled**3 * np.exp(-scaled) / (6.0 * state.size_scale))
@@ -236,34 +194,10 @@ def volume_density(state: SteadyState, size: ArrayLike) -> FloatArray:
 def cumulative_volume(size_scale: float, size: ArrayLike) -> FloatArray:
     """Volume fraction of crystals smaller than L: the regularised incomplete gamma function ``P(4, L/(G tau))``.
 
-    Parameters
-    ----------
-    size_scale : float
-        G tau, m.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    ndarray, shape (...)
-
-    Raises
-    ------
-    CrystallizerError
-        If the size scale is not positive and finite, or a size is negative or not finite.
+    Size scale G tau and sizes L in m; a size scale that is not positive and finite, or a size that is negative or not
+    finite, raises a CrystallizerError.
     """
-    return np.asarray(gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
-
-
-def sum_x_over_d2(size_scale: float) -> float:
-    """Sum of x/d^2 over the full distribution, 1/m2 (paper eq. 3): the integral of w/L^2 is ``1/(6 (G tau)^2)``.
-
-    Raises
-    ------
-    CrystallizerError
-        If the size scale is not positive and finite.
-    """
-    return 1.0 / (6.0 * _checked("size_scale", size_scale, _positive) ** 2)
+    return np.asarray(scipy.special.gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
 
 
 def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -271,43 +205,20 @@ def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, Flo
 
     The integrals of w/L and w/L^2 up to L are ``P(3, L/a)/(3 a)`` and ``P(2, L/a)/(6 a^2)`` with ``a = G tau``.
 
-    Parameters
-    ----------
-    size_scale : float
-        G tau, m.
-    size : array_like, shape (...)
-        Sizes L, m.
-
-    Returns
-    -------
-    tuple of ndarray, shape (...) each
-
-    Raises
-    ------
-    CrystallizerError
-        If the size scale is not positive and finite, or a size is negative or not finite.
+    Arguments and errors as of :func:`cumulative_volume`.
     """
     a = _checked("size_scale", size_scale, _positive)
     scaled = _sizes(size) / a
-    return np.asarray(gammainc(3.0, scaled) / (3.0 * a)), np.asarray(gammainc(2.0, scaled) / (6.0 * a**2))
+    first, second = (scipy.special.gammainc(order, scaled) for order in (3.0, 2.0))
+    return np.asarray(first / (3.0 * a)), np.asarray(second / (6.0 * a**2))
 
 
-def crystal_size_distribution(
-    size_scale: float, bin_width: float = BIN_WIDTH, upper_scales: float = UPPER_SCALES
-) -> CrystalSizeDistribution:
-    """Cut the product into size classes of about ``bin_width`` (paper section 3.1, Fig 5, before truncation).
+def crystal_size_distribution(size_scale: float, bin_width: float = BIN_WIDTH) -> CrystalSizeDistribution:
+    """Cut the product of size scale G tau (m) into size classes of about ``bin_width`` (m; paper section 3.1, Fig 5).
 
-    Every class adds to the sums of x/d and x/d^2 what its crystals do, not what as many at its centre would: that
-    would be 0.5 % more resistance for the paper's alum.
-
-    Parameters
-    ----------
-    size_scale : float
-        G tau, m.
-    bin_width : float
-        Wanted class width, m; the width used divides the largest size into a whole number of classes.
-    upper_scales : float
-        Largest size considered, in size scales.
+    Every class adds to the sums of x/d and x/d^2 what its crystals do, not what as many at its centre would: that would
+    be 0.5 % more resistance for the paper's alum. The width used divides the largest size into a whole number of
+    classes.
 
     Raises
     ------
@@ -316,7 +227,7 @@ def crystal_size_distribution(
     CsdError
         If a class is wider than the largest size.
     """
-    upper = _checked("size_scale", size_scale, _positive) * _checked("upper_scales", upper_scales, _positive)
+    upper = _checked("size_scale", size_scale, _positive) * UPPER_SCALES
     width = _checked("bin_width", bin_width, _positive)
     if upper > MOST_CLASSES * width:
         raise CrystallizerError(
@@ -391,7 +302,7 @@ def _sizes(size: ArrayLike) -> FloatArray:
 
 
 def _checked(name: str, value: Any, check: Callable[[Any], T]) -> T:
-    """Pass a value through its check and name it if that fails."""
+    """Check a value; the error names it."""
     try:
         return check(value)
     except ValueError as error:
@@ -463,7 +374,7 @@ _CHECKS: Final[dict[str, Callable[[Any], Any]]] = {
     "source": _text,
     "residence_time_range": _range,
 }
-"""What each attribute of the kinetics must pass."""
+"""Check of each attribute of the kinetics."""
 
 _ATTRIBUTES: Final[dict[str, str]] = {
     "nucleation_coefficient": "nucleation_coefficient",
@@ -524,8 +435,7 @@ def _read_entry(name: Any, entry: Any, file: str) -> tuple[dict[str, Any], list[
 
 def _unknown(what: str, word: str, known: Iterable[str]) -> str:
     names = list(known)
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
-    return f"no such {what}; allowed: {', '.join(names)}" + (f"; did you mean {close[0]}?" if close else "")
+    return f"no such {what}; allowed: {', '.join(names)}{did_you_mean(word, names)}"
 
 
 def _shown(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from filtercake.errors import CsdError, shown
 from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, NUMBER, FloatArray, split_header
@@ -115,20 +115,6 @@ class CrystalSizeDistribution:
         """Sauter mean diameter d32, m."""
         return 1.0 / self.sum_x_over_d
 
-    def mean_size(self, p: int, q: int) -> float:
-        """Moment mean diameter d_pq = (sum n d^p / sum n d^q)^(1/(p-q)), m (d10 number, d43 volume mean).
-
-        Raises
-        ------
-        ValueError
-            If p equals q.
-        """
-        if p == q:
-            raise ValueError("a moment mean needs two different orders p and q")
-        upper = float(np.sum(self.number_fraction * self.size**p))
-        lower = float(np.sum(self.number_fraction * self.size**q))
-        return float((upper / lower) ** (1.0 / (p - q)))
-
     def class_counts(self, particles: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         """Whole numbers of spheres per class that add up to ``particles``, by largest remainder, shape (n,)."""
         ideal = self.number_fraction * particles
@@ -140,6 +126,17 @@ class CrystalSizeDistribution:
 
 FullAndTruncated: TypeAlias = tuple[CrystalSizeDistribution, CrystalSizeDistribution]
 """A distribution, whole and as it is packed."""
+
+
+def kept_classes(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> NDArray[np.bool_]:
+    """Whether each class of the full distribution is packed, shape (n,); sizes may differ by rounding."""
+    nearest = np.searchsorted(truncated.size, full.size * (1.0 - SAME_SIZE)).clip(max=truncated.size.size - 1)
+    return np.asarray(np.isclose(full.size, truncated.size[nearest], rtol=SAME_SIZE, atol=0.0))
+
+
+def kept_volume(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> float:
+    """Share of the crystal volume that is packed."""
+    return float(full.volume_fraction[kept_classes(full, truncated)].sum())
 
 
 @dataclass(frozen=True)
@@ -190,7 +187,7 @@ def truncate(
 
 def _nothing_left(
     csd: CrystalSizeDistribution,
-    inside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    inside: NDArray[np.bool_],
     share: float,
     smallest: float,
     largest: float,
@@ -295,7 +292,7 @@ def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) 
         Columns size_um, volume_fraction, number_fraction, x_over_d_1_m, x_over_d2_1_m2, truncated_volume_fraction,
         truncated_number_fraction; one row per class of the full distribution.
     """
-    inside = np.isin(full.size, truncated.size)
+    inside = kept_classes(full, truncated)
     volume, number = np.zeros(full.size.size), np.zeros(full.size.size)
     volume[inside], number[inside] = truncated.volume_fraction, truncated.number_fraction
     return pd.DataFrame(
@@ -329,6 +326,17 @@ def from_table(table: pd.DataFrame) -> FullAndTruncated:
     full = replace(full, x_over_d=over_d, x_over_d2=over_d2)
     truncated = CrystalSizeDistribution.from_classes(size, table["truncated_volume_fraction"].to_numpy(np.float64))
     return full, truncated
+
+
+def read_tables(paths: Iterable[str | Path]) -> dict[str, FullAndTruncated]:
+    """Read distributions, named by their files, from what :func:`to_table` tabulated.
+
+    Raises
+    ------
+    CsdError
+        As :func:`from_table`.
+    """
+    return {Path(path).stem: from_table(pd.read_csv(path)) for path in paths}
 
 
 def _check_classes(sizes: FloatArray, fractions: FloatArray) -> None:

@@ -1,32 +1,28 @@
-"""Which figures a calibration has, what they show, and how one is drawn.
-
-A new figure is one module with ``draw(data) -> Figure`` and one line in ``CALIBRATION_FIGURES``.
-"""
+"""A calibration as its figures see it: tables, estimates, and the means of measurements and packings."""
 
 from __future__ import annotations
 
-import importlib
 import math
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 from scipy import special
 
 from filtercake.calibration.fit import CONFIDENCE
-from filtercake.calibration.measurements import Measurements, compressibility_by_csd
+from filtercake.calibration.measurements import Measurements
+from filtercake.figures import style
+from filtercake.packing.engines import label_of
 from filtercake.packing.replication import half_width
-
-if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
-    from matplotlib.figure import Figure
 
 Z = float(special.ndtri(0.5 + 0.5 * CONFIDENCE))
 """Standard errors from an estimate to the end of its 95 % interval."""
 ESTIMATORS = {"interior": "interior porosity", "paper_count": "porosity counted as in the paper"}
-"""Names of estimators for readers; one that is not listed keeps its own."""
+"""Names of estimators in figures; one that is not listed keeps its own."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +44,7 @@ class CalibrationData:
     labels : dict of str to str
         Names of the distributions for readers; their order chooses colours and markers.
     measurements : Measurements or None
-        What was measured, for the figures of the tests.
+        Measurements, for the figures of the tests.
     """
 
     name: str
@@ -94,62 +90,8 @@ class CalibrationData:
         return known.index(csd) if csd in known else len(known)
 
     def label(self, csd: str, characters: int = 40) -> str:
-        """Name of a distribution for readers, in lines of so many characters."""
+        """Label of a distribution, wrapped to a number of characters."""
         return textwrap.fill(self.labels.get(csd) or csd, characters)
-
-
-@dataclass(frozen=True)
-class CalibrationFigure:
-    """A figure's module below ``filtercake.figures``, and what gives it something to show.
-
-    Attributes
-    ----------
-    module : str
-        Its module.
-    needs : {"", "predictions", "tests", "pressures"}
-        What a calibration must have: predictions, filtration tests, or resistances at several pressures.
-    """
-
-    module: str
-    needs: str = ""
-
-    @property
-    def of_tests(self) -> bool:
-        """Whether it is drawn from the measurements alone."""
-        return self.needs in ("tests", "pressures")
-
-
-CALIBRATION_FIGURES: dict[str, CalibrationFigure] = {
-    "calibration_objective": CalibrationFigure("calibration_objective"),
-    "calibration_parity": CalibrationFigure("calibration_parity"),
-    "calibration_resistance": CalibrationFigure("calibration_resistance"),
-    "calibration_predictions": CalibrationFigure("calibration_predictions", "predictions"),
-    "filtration_fits": CalibrationFigure("filtration_fits", "tests"),
-    "compressibility": CalibrationFigure("compressibility", "pressures"),
-}
-
-
-def figures_of(predicts: bool, measurements: Measurements | None = None) -> list[str]:
-    """Names of the figures a calibration has."""
-    has = {"": True, "predictions": predicts}
-    if measurements is not None:
-        has |= {"tests": bool(measurements.tests), "pressures": bool(compressibility_by_csd(measurements))}
-    return [name for name, figure in CALIBRATION_FIGURES.items() if has.get(figure.needs, False)]
-
-
-def module_of(figure: str) -> str:
-    """Library module behind a figure, below ``filtercake``."""
-    return f"figures.{CALIBRATION_FIGURES[figure].module}"
-
-
-def draw(figure: str, data: CalibrationData) -> Figure:
-    """Draw a figure."""
-    from filtercake.figures import style
-
-    module = importlib.import_module(f"filtercake.{module_of(figure)}")
-    with style.applied():
-        drawn: Figure = module.draw(data.measurements if CALIBRATION_FIGURES[figure].of_tests else data)
-    return drawn
 
 
 def measured_means(data: CalibrationData) -> pd.DataFrame:
@@ -178,10 +120,7 @@ def packed_friction(data: CalibrationData) -> float:
 def packed_at(data: CalibrationData, csd: str, friction: float) -> pd.DataFrame:
     """Average the accepted packings of a distribution and a friction by cohesion, all batches together.
 
-    Returns
-    -------
-    DataFrame
-        cohesion_kJ_m3, resistance_m_kg and resistance_ci95_m_kg; nan where no packing was accepted.
+    The columns are cohesion_kJ_m3, resistance_m_kg and resistance_ci95_m_kg, nan where no packing was accepted.
     """
     own = data.simulated[(data.simulated["csd"] == csd) & np.isclose(data.simulated["friction"], friction)]
     rows = []
@@ -201,7 +140,7 @@ def main_packings(data: CalibrationData, csds: Sequence[str]) -> pd.DataFrame:
 
 
 def fitted_packings(data: CalibrationData, *, rivals: bool = False) -> pd.DataFrame:
-    """Packings of the measured distributions behind the fit, and behind those of rival frictions too if asked for."""
+    """Packings of the measured distributions behind the fit; with ``rivals``, those of rival frictions too."""
     if rivals:
         return data.simulated[data.simulated["csd"].isin(data.measured)]
     return main_packings(data, data.measured)
@@ -214,26 +153,10 @@ def count(rows: pd.DataFrame) -> str:
 
 
 def footer(figure: Figure, data: CalibrationData, packings: Sequence[str], engines: Iterable[str], *notes: str) -> None:
-    """Say below a figure what was fitted to what, by how many packings of which engine.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    data : CalibrationData
-        What it shows.
-    packings : sequence of str
-        Packings in words (see :func:`count`).
-    engines : iterable of str
-        Engine of each.
-    *notes : str
-        What else there is to say.
-    """
-    from filtercake.figures import style
-
+    """Write below a figure what was fitted, by which packings (see :func:`count`) and engines; and notes."""
     estimator = ESTIMATORS.get(data.summary["estimator"], data.summary["estimator"])
     what = "cohesion and friction fitted" if data.fits_friction else f"cohesion fitted at friction {data.friction:g}"
-    names = ", ".join(style.ENGINES.get(name, name) for name in sorted({str(engine) for engine in engines}))
+    names = ", ".join(label_of(name) for name in sorted({str(engine) for engine in engines}))
     style.footer(figure, pd.DataFrame(), f"{what}, resistances from the {estimator}", *packings, names, *notes)
 
 

@@ -1,9 +1,9 @@
-"""How well each cohesion (and friction) describes the measurements, and what must be known of the answer."""
+"""Deviance of each cohesion (and friction) from the measurements, and the findings about the fit."""
 
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,10 +13,8 @@ from scipy import special
 
 from filtercake.calibration.fit import CONFIDENCE
 from filtercake.figures import calibrated, style
+from filtercake.figures.calibrated import CalibrationData
 from filtercake.units import FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
 
 THRESHOLD = float(special.chdtri(1, 1.0 - CONFIDENCE))
 """Deviance up to which a value belongs to the 95 % interval of one parameter."""
@@ -120,7 +118,7 @@ def _interval(axes: Axes, data: CalibrationData) -> None:
 
 
 def stretches(values: FloatArray, deviance: FloatArray) -> list[tuple[float, float]]:
-    """Find where a deviance on a grid is under the threshold: the ends of every stretch, ascending."""
+    """Return the ends of every stretch in which a deviance on a grid is under the threshold, ascending."""
     excess = deviance - THRESHOLD
     inside = np.concatenate([[False], excess <= 0.0, [False]])
     first, last = np.flatnonzero(~inside[:-1] & inside[1:]), np.flatnonzero(inside[:-1] & ~inside[1:]) - 1

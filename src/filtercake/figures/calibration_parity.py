@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from filtercake.figures import calibrated, style
+from filtercake.figures.calibrated import CalibrationData
 from filtercake.units import FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
 
 MARGIN = 1.08
 """Factor by which the axes go beyond the data."""
@@ -41,7 +38,7 @@ def draw(data: CalibrationData) -> Figure:
         [low, high], [low, high], color=style.INK, linewidth=0.8, zorder=1, label="modelled = measured", gid="equal"
     )
     style.resistance_axis(axes, np.array([low, high]), log=True, factor=", modelled")
-    resistance_abscissa(axes, np.array([low, high]), ", measured")
+    style.resistance_axis(axes, np.array([low, high]), log=True, factor=", measured", abscissa=True)
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)
     style.legend(figure, [axes], columns=1, extra=keys)
@@ -52,18 +49,8 @@ def draw(data: CalibrationData) -> Figure:
     return figure
 
 
-def resistance_abscissa(axes: Axes, values: FloatArray, what: str = "") -> None:
-    """Label the x axis as :func:`style.resistance_axis` labels a logarithmic y axis; the data stay in m/kg."""
-    exponent = int(np.floor(np.log10(np.nanmax(values))))
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel(f"Specific cake resistance{what} ({style.power_of_ten(exponent)} m/kg)")
-
-
 def typical_errors(means: pd.DataFrame) -> str:
-    """Say how far the model is from the measured means of the distributions: root mean square of the ln error."""
+    """Root mean square of the ln errors against the measured means of the distributions, in words."""
     measured = np.log(means["measured_m_kg"].to_numpy(np.float64))
     words = []
     for column, what in (("modelled_m_kg", "modelled"), ("left_out_m_kg", "predicted from the others")):

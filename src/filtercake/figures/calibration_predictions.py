@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,10 +10,7 @@ from matplotlib.ticker import LogLocator
 
 from filtercake.calibration.rounds import SAFETY_FACTOR
 from filtercake.figures import calibrated, style
-from filtercake.figures.calibration_parity import resistance_abscissa
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
+from filtercake.figures.calibrated import CalibrationData
 
 RESISTANCE = ("resistance_m_kg", "resistance_low_m_kg", "resistance_high_m_kg", "resistance_with_safety_factor_m_kg")
 AREA = ("filter_area_m2", "filter_area_low_m2", "filter_area_high_m2", "filter_area_with_safety_factor_m2")
@@ -43,7 +38,7 @@ def draw(data: CalibrationData) -> Figure:
         sharey=True,
     )
     _rows(panels[0], table, RESISTANCE)
-    resistance_abscissa(panels[0], table[RESISTANCE[0]].to_numpy(np.float64))
+    style.resistance_axis(panels[0], table[RESISTANCE[0]].to_numpy(np.float64), log=True, abscissa=True)
     if table[RESISTANCE[3]].max() < DECADE * table[RESISTANCE[1]].min():
         panels[0].xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)))
     panels[0].set_title(calibrated.panel_title(data, 45 if filtered else 75), loc="left")
@@ -99,7 +94,7 @@ def _footer(figure: Figure, data: CalibrationData, table: pd.DataFrame) -> None:
 
 
 def _covered(data: CalibrationData, table: pd.DataFrame) -> str:
-    """Say whether the safety factor covers the intervals."""
+    """Whether the safety factor covers the intervals, in words."""
     beyond = table[table["high_over_resistance"] > SAFETY_FACTOR]
     if beyond.empty:
         most = float(table["high_over_resistance"].max())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,9 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from filtercake.figures import calibrated, style
-
-if TYPE_CHECKING:
-    from filtercake.figures.calibrated import CalibrationData
+from filtercake.figures.calibrated import CalibrationData
 
 TOGETHER = 3
 """Most distributions in one panel."""
@@ -50,7 +48,7 @@ def draw(data: CalibrationData) -> Figure:
 
 
 def _friction(data: CalibrationData, friction: float) -> str:
-    """Say where the packings shown are not of the curves' friction."""
+    """Note that the packings shown have another friction than the curves; empty where they have the same."""
     if np.isclose(friction, data.friction):
         return ""
     return f"packings are those at friction {friction:g}, the nearest to the {data.friction:.3g} of the curves"

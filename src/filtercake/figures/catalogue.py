@@ -1,94 +1,21 @@
-"""Which figures there are, which of them a study has, and how one is drawn and saved.
+"""Registry of the figures of studies and calibrations.
 
-A new figure is one module with ``draw(data) -> Figure`` and one line in ``FIGURES``.
+A new figure is one module with ``draw(data) -> Figure`` and one line in ``FIGURES`` or ``CALIBRATION_FIGURES``.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
-from filtercake.crystals.csd import CrystalSizeDistribution, from_table
-from filtercake.packing.result import publish
+from filtercake.calibration.measurements import Measurements, compressibility_by_csd
 from filtercake.study.config.study import Study
 from filtercake.study.points import Point
 
 if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
     from matplotlib.figure import Figure
-
-
-FOOTER = "Description"
-"""Metadata of a PNG that holds the line below its figure: packings, failures, engine."""
-
-
-@dataclass(frozen=True)
-class StudyData:
-    """Everything a figure may show of a study.
-
-    Attributes
-    ----------
-    name : str
-        The study.
-    study : Study
-        Its model (labels, published values, material).
-    points, summary, replicates : DataFrame
-        Its tables (see :mod:`filtercake.study.points`).
-    csds : dict of str to (CrystalSizeDistribution, CrystalSizeDistribution)
-        Full and truncated distribution by name.
-    packings : Path
-        Folder with one folder of packings per point.
-    crystallizer : DataFrame
-        The table of the crystallizer's states (:func:`filtercake.results.paper_tables.crystallizer_table`); empty
-        without one.
-    """
-
-    name: str
-    study: Study
-    points: pd.DataFrame
-    summary: pd.DataFrame
-    replicates: pd.DataFrame
-    csds: dict[str, tuple[CrystalSizeDistribution, CrystalSizeDistribution]]
-    packings: Path
-    crystallizer: pd.DataFrame = field(default_factory=pd.DataFrame)
-
-    @classmethod
-    def read(
-        cls, name: str, study: Mapping[str, Any], folder: Path, csds: Iterable[str], crystallizer: Iterable[str]
-    ) -> StudyData:
-        """Read a study's tables.
-
-        Parameters
-        ----------
-        name : str
-            The study.
-        study : mapping
-            Its model's values.
-        folder : Path
-            Its results: points.csv, summary.csv, replicates.csv, packings.
-        csds : iterable of str
-            Tables of its distributions, named by them.
-        crystallizer : iterable of str
-            The crystallizer's table, if it has one.
-        """
-        return cls(
-            name=name,
-            study=Study.model_validate(study),
-            points=pd.read_csv(folder / "points.csv"),
-            summary=pd.read_csv(folder / "summary.csv"),
-            replicates=pd.read_csv(folder / "replicates.csv"),
-            csds={Path(table).stem: from_table(pd.read_csv(table)) for table in csds},
-            packings=folder / "packings",
-            crystallizer=next(map(pd.read_csv, crystallizer), pd.DataFrame()),
-        )
-
-
-def _always(_anything: object) -> bool:
-    return True
 
 
 @dataclass(frozen=True)
@@ -100,20 +27,23 @@ class FigureSpec:
     module : str
         Its module.
     applies : callable
-        Whether a list of points does.
+        Whether it shows anything of a study's points, or of a calibration's predictions (True if any) and measurements.
     needs : callable
-        Whether a study's model does.
+        Whether it shows anything of a study's model.
+    of_tests : bool
+        Whether it is drawn from a calibration's measurements alone.
     """
 
     module: str
-    applies: Callable[[list[Point]], bool] = _always
-    needs: Callable[[Study], bool] = _always
+    applies: Callable[..., bool] = lambda *_: True
+    needs: Callable[[Study], bool] = lambda _: True
+    of_tests: bool = False
 
 
 def _varies(name: str) -> Callable[[list[Point]], bool]:
     def applies(points: list[Point]) -> bool:
         return any(
-            len({getattr(point.spec, name) for point in points if point.csd == csd}) > 1
+            len({getattr(point.scene, name) for point in points if point.csd == csd}) > 1
             for csd in {point.csd for point in points}
         )
 
@@ -152,6 +82,19 @@ FIGURES: dict[str, FigureSpec] = {
     "packing_cross_section": FigureSpec("cross_section"),
     "packing_porosity_profile": FigureSpec("profile"),
 }
+"""Figures of studies."""
+
+CALIBRATION_FIGURES: dict[str, FigureSpec] = {
+    "calibration_objective": FigureSpec("calibration_objective"),
+    "calibration_parity": FigureSpec("calibration_parity"),
+    "calibration_resistance": FigureSpec("calibration_resistance"),
+    "calibration_predictions": FigureSpec("calibration_predictions", lambda predicts, _: predicts),
+    "filtration_fits": FigureSpec("filtration_fits", lambda _, measured: bool(measured.tests), of_tests=True),
+    "compressibility": FigureSpec(
+        "compressibility", lambda _, measured: bool(compressibility_by_csd(measured)), of_tests=True
+    ),
+}
+"""Figures of calibrations."""
 
 
 def figures_of(points: Iterable[Point], study: Study) -> list[str]:
@@ -160,31 +103,22 @@ def figures_of(points: Iterable[Point], study: Study) -> list[str]:
     return [name for name, spec in FIGURES.items() if spec.applies(listed) and spec.needs(study)]
 
 
+def figures_of_calibration(predicts: bool, measurements: Measurements) -> list[str]:
+    """Names of the figures a calibration has."""
+    return [name for name, spec in CALIBRATION_FIGURES.items() if spec.applies(predicts, measurements)]
+
+
 def module_of(figure: str) -> str:
     """Library module behind a figure, below ``filtercake``."""
-    return f"figures.{FIGURES[figure].module}"
+    return f"figures.{(FIGURES | CALIBRATION_FIGURES)[figure].module}"
 
 
-def draw(figure: str, data: StudyData) -> Figure:
-    """Draw a figure."""
+def draw(figure: str, data: Any) -> Figure:
+    """Draw a figure of a study or a calibration from its ``StudyData`` or ``CalibrationData``."""
     from filtercake.figures import style
 
     module = importlib.import_module(f"filtercake.{module_of(figure)}")
+    spec = (FIGURES | CALIBRATION_FIGURES)[figure]
     with style.applied():
-        drawn: Figure = module.draw(data)
+        drawn: Figure = module.draw(data.measurements if spec.of_tests else data)
     return drawn
-
-
-def save(figure: Figure, png: Path, pdf: Path) -> None:
-    """Save a figure as PNG (300 dpi) and PDF; no date inside, so that the same figure is the same file.
-
-    The PNG carries the line that stands below the figure, for its caption.
-    """
-    from filtercake.figures import style
-
-    footer = " ".join(figure.get_supxlabel().split())
-    with style.applied():
-        with publish(png) as temporary:
-            figure.savefig(temporary, format="png", dpi=300, metadata={FOOTER: footer})
-        with publish(pdf) as temporary:
-            figure.savefig(temporary, format="pdf", metadata={"CreationDate": None})

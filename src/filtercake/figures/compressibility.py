@@ -18,7 +18,7 @@ from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.units import KILOPASCAL
 
 BEYOND = 1.12
-"""How far a line goes beyond the lowest and the highest pressure."""
+"""Factor by which a line extends beyond the lowest and the highest pressure."""
 MOST_DIGITS = 3
 """Digits behind the point of an exponent, at most."""
 LINE, BAND = "line", "band"

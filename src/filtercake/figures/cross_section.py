@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -14,12 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import bed_height, interior_slab
 from filtercake.units import MICROMETRE, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 FEW_SIZES = 5
 """Up to so many sizes are named in a legend; more take a colour bar."""
@@ -50,23 +46,12 @@ def draw(data: StudyData) -> Figure:
 
 
 def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Circles in which the plane at ``y`` cuts the spheres, periodic images included.
-
-    Parameters
-    ----------
-    packing : Packing
-        The packing, periodic in x and y.
-    y : float
-        Where the plane is, m.
+    """Circles in which the plane at ``y`` (m) cuts the spheres, periodic images in x and y included.
 
     Returns
     -------
-    centre : ndarray, shape (m, 2)
-        x and z of the circles' centres, m; the part of a circle beyond a side is drawn at the other.
-    cut_radius : ndarray, shape (m,)
-        Radii of the circles, m.
-    diameter : ndarray, shape (m,)
-        Diameters of the spheres, m.
+    tuple of ndarray
+        x and z of the circles' centres, shape (m, 2), their radii and the spheres' diameters, shape (m,), all in m.
     """
     length, position, radius = packing.length, packing.position, packing.radius
     offset = position[:, 1] - y

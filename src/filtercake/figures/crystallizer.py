@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.units import LITRE, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 
 def draw(data: StudyData) -> Figure:
@@ -31,8 +27,8 @@ def draw(data: StudyData) -> Figure:
     for k, axes in enumerate(panels):
         axes.plot(*_power_laws(volumes, rates[:, k]), "-", color=style.colour(k), gid="curve")
         axes.plot(volumes, rates[:, k], "o", color=style.colour(k), gid="study")
-    style.power_axis(upper, rates[:, 0], "Growth rate G\n", "m/s")
-    style.power_axis(lower, rates[:, 1], "Nucleation rate B₀\n", "#/(L s)")
+    style.power_axis(upper.yaxis, rates[:, 0], "Growth rate G\n", "m/s")
+    style.power_axis(lower.yaxis, rates[:, 1], "Nucleation rate B₀\n", "#/(L s)")
     for k, axes in enumerate(panels):
         axes.set_ylim(0.0, 1.08 * rates[:, k].max())
     keys = [
@@ -45,7 +41,7 @@ def draw(data: StudyData) -> Figure:
 
 
 def _power_laws(volume: FloatArray, rate: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Join rates by what they are: powers of the residence time, and so straight between logarithms."""
+    """Interpolate rates as power laws of the residence time: linearly between logarithms."""
     sampled = np.geomspace(volume[0], volume[-1], 201)
     return sampled, np.exp(np.interp(np.log(sampled), np.log(volume), np.log(rate)))
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from filtercake.crystals.crystallizer import volume_density
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.units import MICROMETRE, MINUTE
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 LARGEST_SHOWN = 3.0
 """Sizes shown, over the largest volume mean: all but 0.2 % of the volume (twelve size scales)."""

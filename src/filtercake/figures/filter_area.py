@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
 from filtercake.figures.filtered import filtered
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
+from filtercake.figures.selection import StudyData
 
 VOLUME = "crystallizer_volume_m3"
 ASIDE = 2
@@ -60,7 +56,7 @@ def published(axes: Axes, data: StudyData, table: pd.DataFrame, quantity: str, s
 
 
 def fall(table: pd.DataFrame) -> str:
-    """Say by how much resistance and area fall from the smallest to the largest crystallizer."""
+    """Change of resistance and area from the smallest to the largest crystallizer, in words."""
     good = table[table["resistance_m_kg"].notna()]
     if len(good) < 2:
         return ""
@@ -73,7 +69,7 @@ def fall(table: pd.DataFrame) -> str:
 
 
 def operating_point(data: StudyData) -> str:
-    """Say in words where the filter works."""
+    """Operating point of the filter, in words."""
     drum = data.study.filter
     if drum is None:
         return ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -14,13 +13,11 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from filtercake.figures import style
 from filtercake.figures.filter_area import VOLUME, operating_point, published
 from filtercake.figures.filtered import filtered
+from filtercake.figures.selection import StudyData
 from filtercake.filtration.drum_filter import DrumFilter, medium_share, resistance_for_cake_share
 from filtercake.filtration.drum_filter import area as filter_area
 from filtercake.results.filter_design import drum_of
 from filtercake.units import HOUR, KILOPASCAL, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 MEDIA = (1e9, 5e9, 1e10, 5e10, 1e11)
 """Resistances of media in use, 1/m."""
@@ -152,7 +149,7 @@ def _logarithmic(axes: Axes) -> None:
 
 
 def _same_limits(panels: list[Axes], table: pd.DataFrame) -> None:
-    """Give the panels the same areas, so that areas compare across pressure drops."""
+    """Set the same ordinate in all panels, so that areas compare across pressure drops."""
     known = table["resistance_m_kg"].notna().any()
     limits = [axes.get_ylim() for axes in panels] if known else [EMPTY]
     lowest, highest = zip(*limits, strict=True)

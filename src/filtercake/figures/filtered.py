@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pandas as pd
 
 from filtercake.figures import selection
+from filtercake.figures.selection import StudyData
 from filtercake.results.filter_design import filter_design
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 
 def filtered(data: StudyData) -> pd.DataFrame:

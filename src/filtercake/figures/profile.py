@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,14 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.packing.porosity import porosity_profile
 from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import bed_height, interior_slab
 from filtercake.units import MICROMETRE, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 SLICES_PER_DIAMETER = 20
 """Slices in one largest diameter: fine enough for the layers that the floor makes."""
@@ -53,12 +51,7 @@ def draw(data: StudyData) -> Figure:
 
 
 def mean_profile(beds: list[Packing]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean porosity profile of beds and the half-width of its 95 % interval.
-
-    Parameters
-    ----------
-    beds : list of Packing
-        At least one.
+    """Mean porosity profile of one or more beds and the half-width of its 95 % interval.
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,11 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.filtration.resistance import kozeny_carman
 from filtercake.study.config.published import Published
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 MARGIN = 0.025
 """Porosity drawn beyond the outermost value."""
@@ -111,5 +109,5 @@ def _published(axes: Axes, data: StudyData, csd: str) -> list[Line2D]:
 
 
 def _origin(value: Published) -> tuple[object, ...]:
-    """Tell which published values belong together."""
+    """Key that published values of one experiment or simulation share."""
     return value.source, value.kind, value.cohesion_kJ_m3, value.friction

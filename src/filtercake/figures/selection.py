@@ -1,34 +1,86 @@
-"""What of a study a figure shows: its base points, their accepted packings, and the published values beside them."""
+"""A study as its figures see it: tables, base points, accepted packings, and the published values beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
 
 from filtercake.crystals.crystallizer import SteadyState
+from filtercake.crystals.csd import FullAndTruncated, read_tables
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
 from filtercake.study.config.published import Published
+from filtercake.study.config.study import Study
 from filtercake.study.points import base_rows
 from filtercake.units import LITRE, MICROMETRE, MINUTE
 
-if TYPE_CHECKING:
-    from pathlib import Path
+T = TypeVar("T")
 
-    from filtercake.figures.catalogue import StudyData
+
+@dataclass(frozen=True)
+class StudyData:
+    """Everything a figure may show of a study.
+
+    Attributes
+    ----------
+    name : str
+        The study.
+    study : Study
+        Its model (labels, published values, material).
+    points, summary, replicates : DataFrame
+        Its tables (see :mod:`filtercake.study.points`).
+    csds : dict of str to FullAndTruncated
+        Full and truncated distribution by name.
+    packings : Path
+        Folder with one folder of packings per point.
+    crystallizer : DataFrame
+        The table of the crystallizer's states (:func:`filtercake.results.paper_tables.crystallizer_table`); empty
+        without one.
+    """
+
+    name: str
+    study: Study
+    points: pd.DataFrame
+    summary: pd.DataFrame
+    replicates: pd.DataFrame
+    csds: dict[str, FullAndTruncated]
+    packings: Path
+    crystallizer: pd.DataFrame = field(default_factory=pd.DataFrame)
+
+    @classmethod
+    def read(
+        cls, name: str, study: Mapping[str, Any], folder: Path, csds: Iterable[str], crystallizer: Iterable[str]
+    ) -> StudyData:
+        """Read a study's tables from its results (points.csv, summary.csv, replicates.csv, packings).
+
+        ``study`` holds the values of its model, ``csds`` the tables of its distributions, named by them, and
+        ``crystallizer`` the crystallizer's table, if it has one.
+        """
+        return cls(
+            name=name,
+            study=Study.model_validate(study),
+            points=pd.read_csv(folder / "points.csv"),
+            summary=pd.read_csv(folder / "summary.csv"),
+            replicates=pd.read_csv(folder / "replicates.csv"),
+            csds=read_tables(csds),
+            packings=folder / "packings",
+            crystallizer=next(map(pd.read_csv, crystallizer), pd.DataFrame()),
+        )
 
 
 def label(data: StudyData, csd: str) -> str:
-    """Name of a distribution for readers."""
+    """Label of a distribution."""
     known = data.study.csds.get(csd)
     return (known.label if known else None) or csd
 
 
 def number(data: StudyData, csd: str) -> int:
-    """Place of a distribution in the study: it has the same colour in every figure."""
+    """Index of a distribution in the study; it sets its colour in every figure."""
     return list(data.study.csds).index(csd)
 
 
@@ -48,16 +100,9 @@ def main_point(data: StudyData) -> pd.Series[Any] | None:
 
 
 def varied(data: StudyData, free: tuple[str, ...], *names: str) -> list[tuple[str, pd.DataFrame]]:
-    """Distributions of which any of some properties varies, with their summary rows otherwise at the base material.
+    """Distributions of which any of the properties ``names`` varies, with their summary rows.
 
-    Parameters
-    ----------
-    data : StudyData
-        The study.
-    free : tuple of str
-        Properties that may differ from the base material.
-    *names : str
-        Properties of which one must vary.
+    Of all other properties only ``free`` may differ from the base material.
     """
     rows = base_rows(data.study, data.summary, free)
     by_csd = ((csd, rows[rows["csd"] == csd]) for csd in data.study.csds)
@@ -90,35 +135,26 @@ def products(data: StudyData) -> list[tuple[str, float, SteadyState]]:
 
 def records(data: StudyData, point: str) -> tuple[list[tuple[int, dict[str, Any]]], str]:
     """Read the records of a point's accepted packings, with their replicates, and a note on the unreadable ones."""
-    found, lost = [], 0
-    for replicate, npz in _accepted(data, point):
-        try:
-            found.append((replicate, read_record(npz.with_suffix(".json"))))
-        except PackingRejected:
-            lost += 1
-    return found, _note(lost)
+    return _accepted(data, point, lambda npz: read_record(npz.with_suffix(".json")))
 
 
 def packings(data: StudyData, point: str, most: int | None = None) -> tuple[list[tuple[int, Packing]], str]:
     """Read a point's accepted packings (the first few), with their replicates, and a note on the unreadable ones."""
-    found: list[tuple[int, Packing]] = []
+    return _accepted(data, point, Packing.load, most)
+
+
+def _accepted(
+    data: StudyData, point: str, read: Callable[[Path], T], most: int | None = None
+) -> tuple[list[tuple[int, T]], str]:
+    rows = data.replicates
+    good = rows[(rows["point"] == point) & (rows["status"] == "ok")]
+    found: list[tuple[int, T]] = []
     lost = 0
-    for replicate, npz in _accepted(data, point):
+    for replicate in sorted(good["replicate"].astype(int)):
         if len(found) == most:
             break
         try:
-            found.append((replicate, Packing.load(npz)))
+            found.append((replicate, read(data.packings / point / f"r{replicate}.npz")))
         except PackingRejected:
             lost += 1
-    return found, _note(lost)
-
-
-def _accepted(data: StudyData, point: str) -> Iterator[tuple[int, Path]]:
-    rows = data.replicates
-    good = rows[(rows["point"] == point) & (rows["status"] == "ok")]
-    for replicate in sorted(good["replicate"].astype(int)):
-        yield replicate, data.packings / point / f"r{replicate}.npz"
-
-
-def _note(lost: int) -> str:
-    return f"{lost} packing{'' if lost == 1 else 's'} could not be read" if lost else ""
+    return found, f"{lost} packing{'' if lost == 1 else 's'} could not be read" if lost else ""

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
 from filtercake.study.points import base_rows
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 PROPERTIES = {"poisson_ratio": "Poisson's ratio (–)", "restitution": "Coefficient of restitution (–)"}
 LEAST_HALF_SPAN = 0.015

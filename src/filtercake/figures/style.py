@@ -1,10 +1,11 @@
-"""How every figure looks: sizes, colours, markers, and the parts that figures share."""
+"""House style of the figures: sizes, colours, markers, and shared parts."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pandas as pd
 from matplotlib import style as mpl_style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
@@ -19,8 +21,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
+from filtercake.packing.engines import label_of
+from filtercake.packing.result import publish
 from filtercake.study.config.published import Published
 from filtercake.units import FloatArray
+
+FOOTER = "Description"
+"""Metadata of a PNG that holds the line below its figure: packings, failures, engine."""
 
 SINGLE, MEDIUM, DOUBLE = 3.5, 5.0, 7.0
 """Widths of a figure, in: one column, one and a half, two."""
@@ -41,13 +48,6 @@ PUBLISHED_WORDS = {"simulation": "simulated", "measurement": "measured"}
 
 POROSITY = "Porosity (–)"
 COHESION = "Cohesion energy density (kJ/m³)"
-
-ENGINES = {
-    "liggghts": "LIGGGHTS",
-    "liggghts_as_published": "LIGGGHTS (protocol as published)",
-    "embedded": "embedded engine",
-}
-"""Names of engines for readers; one that is not listed keeps its own."""
 
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
@@ -83,6 +83,19 @@ def applied() -> Iterator[None]:
         yield
 
 
+def save(figure: Figure, png: Path, pdf: Path) -> None:
+    """Save a figure as PNG (300 dpi) and PDF; no date inside, so that the same figure is the same file.
+
+    The PNG carries the line that stands below the figure, for its caption.
+    """
+    footer = " ".join(figure.get_supxlabel().split())
+    with applied():
+        with publish(png) as temporary:
+            figure.savefig(temporary, format="png", dpi=300, metadata={FOOTER: footer})
+        with publish(pdf) as temporary:
+            figure.savefig(temporary, format="pdf", metadata={"CreationDate": None})
+
+
 def panels(
     count: int = 1,
     *,
@@ -93,20 +106,10 @@ def panels(
     sharex: bool = False,
     sharey: bool = False,
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure with a grid of panels, row by row.
+    """Make a figure of ``width`` by ``height`` inches with ``count`` panels, row by row.
 
-    Parameters
-    ----------
-    count : int
-        Panels.
-    width, height : float
-        Size of the whole figure, in.
-    columns : int
-        Panels side by side.
-    ratios : sequence of float, optional
-        Relative heights of the rows.
-    sharex, sharey : bool
-        Whether all panels have the same axis.
+    ``ratios`` are the relative heights of the rows; ``sharex`` and ``sharey`` say whether all panels have the same
+    axis.
     """
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
@@ -154,19 +157,17 @@ def error_line(
     Parameters
     ----------
     axes : Axes
-        Where.
+        Panel.
     rows : DataFrame
-        The points of the series, in order.
+        Points of the series, in order.
     x, y : str
         Columns of the abscissa and the means.
     interval : str or tuple of str
-        Column of the half-widths of their intervals, or columns of the lower and the upper ends.
-    label : str
-        Name of the series.
-    index : int
-        Chooses colour and marker.
+        Column of the half-widths of the intervals, or columns of their lower and upper ends.
+    label, index : str, int
+        Name of the series; number that chooses its colour and marker.
     place, count : int
-        Which of how many series side by side it is.
+        Place of the series among ``count`` side by side.
     """
     positions, means = rows[x].to_numpy(np.float64), rows[y].to_numpy(np.float64)
     good = np.isfinite(means)
@@ -248,25 +249,19 @@ def published_level(axes: Axes, value: Published) -> None:
     )
 
 
-def resistance_axis(axes: Axes, values: FloatArray, *, log: bool = False, factor: str = "") -> None:
-    """Label the y axis as specific cake resistance in a power of ten of m/kg; the data stay in m/kg.
+def resistance_axis(
+    axes: Axes, values: FloatArray, *, log: bool = False, factor: str = "", abscissa: bool = False
+) -> None:
+    """Label the y axis, or the abscissa, as specific cake resistance in a power of ten of m/kg; the data stay in m/kg.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    values : ndarray
-        What is shown; the largest finite one chooses the power of ten.
-    log : bool
-        Whether the axis is logarithmic.
-    factor : str
-        Words before the unit.
+    The largest finite one of ``values`` chooses the power; ``factor`` is put before the unit.
     """
+    axis = axes.xaxis if abscissa else axes.yaxis
     if log:
-        axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-    power_axis(axes, values, f"Specific cake resistance{factor}", "m/kg", otherwise=9)
+        axes.set(**{"xscale" if abscissa else "yscale": "log"})
+        axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
+        axis.set_minor_formatter(NullFormatter())
+    power_axis(axis, values, f"Specific cake resistance{factor}", "m/kg", otherwise=9)
 
 
 def volume_axis(axes: Axes, largest: float) -> None:
@@ -277,24 +272,15 @@ def volume_axis(axes: Axes, largest: float) -> None:
         axes.set_xlim(0.0, 1.06 * largest)
 
 
-def power_axis(axes: Axes, values: FloatArray, name: str, unit: str, *, otherwise: int = 0) -> None:
-    """Label the y axis in a power of ten of a unit; the data stay in the unit.
+def power_axis(axis: Axis, values: FloatArray, name: str, unit: str, *, otherwise: int = 0) -> None:
+    """Label an axis with a name and a power of ten of a unit; the data stay in the unit.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    values : ndarray
-        What is shown; the largest finite one chooses the power of ten.
-    name, unit : str
-        What is shown (may end in a line break), and in what.
-    otherwise : int
-        The power of ten where no value is finite.
+    The largest finite one of ``values`` chooses the power, ``otherwise`` where none is finite.
     """
     finite = values[np.isfinite(values)]
     exponent = int(np.floor(np.log10(finite.max()))) if finite.size else otherwise
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
-    axes.set_ylabel(f"{name} ({power_of_ten(exponent)} {unit})".replace("\n ", "\n"))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:g}"))
+    axis.set_label_text(f"{name} ({power_of_ten(exponent)} {unit})".replace("\n ", "\n"))
 
 
 def power_of_ten(exponent: int) -> str:
@@ -335,17 +321,7 @@ def key(label: str, **properties: Any) -> Line2D:
 
 
 def footer(figure: Figure, rows: pd.DataFrame, *notes: str) -> None:
-    """Say below a figure how many packings it shows, how many failed and what made them.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    rows : DataFrame
-        The rows of the summary it shows.
-    *notes : str
-        What else there is to say.
-    """
+    """Write below a figure what the summary's rows hold: packings, failures, engines; and notes."""
     parts = [describe_counts(rows), *notes] if len(rows) else list(notes)
     characters = int(figure.get_figwidth() * 21.0)
     text = "\n".join(textwrap.wrap("; ".join(part for part in parts if part), characters))
@@ -357,12 +333,12 @@ def describe_counts(rows: pd.DataFrame) -> str:
     least, most, failed = int(rows["n"].min()), int(rows["n"].max()), int(rows["n_failed"].sum())
     each = f"n = {least}" if least == most else f"n = {least} to {most}"
     per_point = " per point" if len(rows) > 1 else ""
-    engines = ", ".join(ENGINES.get(name, name) for name in sorted(set(rows["engine"].astype(str))))
+    engines = ", ".join(label_of(name) for name in sorted(set(rows["engine"].astype(str))))
     return f"{each} packing{'' if most == 1 else 's'}{per_point}, {failed or 'none'} failed; {engines}"
 
 
 def nothing(axes: Axes, reason: str) -> None:
-    """Say in the middle of empty axes why there is nothing to see."""
+    """Write into empty axes why they are empty."""
     sentence = "\n".join(textwrap.wrap(reason, 38))
     plate = {"facecolor": "white", "edgecolor": "none"}
     axes.text(0.5, 0.5, sentence, transform=axes.transAxes, ha="center", va="center", color=FAINT, bbox=plate, zorder=9)

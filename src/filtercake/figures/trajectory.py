@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
+from filtercake.packing.engines import kind_of
 from filtercake.units import FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
 
 MILLISECOND = 1e-3
 INSET_SPAN = 0.03
@@ -36,7 +35,7 @@ def draw(data: StudyData) -> Figure:
         style.nothing(upper, "no accepted packing at the base material")
         style.footer(figure, rows, note)
         return figure
-    stopped = "end of the fixed run" if point["engine"] == "liggghts_as_published" else "stopped: bed at rest"
+    stopped = "end of the fixed run" if kind_of(point["engine"]).fixed_steps else "stopped: bed at rest"
     inset = upper.inset_axes((0.52, 0.46, 0.37, 0.52))
     for axes in (upper, inset):
         _lines(axes, runs, "porosity_sample", stopped)
@@ -53,14 +52,7 @@ def draw(data: StudyData) -> Figure:
 
 
 def mean_trajectory(runs: list[dict[str, Any]], quantity: str) -> tuple[FloatArray, FloatArray]:
-    """Average trajectories of different lengths; a bed at rest stays as it was when its run stopped.
-
-    Parameters
-    ----------
-    runs : list of dict
-        Trajectories as recorded, with ``time_s`` and the quantity.
-    quantity : str
-        What to average.
+    """Average a quantity of trajectories of different lengths; a bed keeps its last value when its run has stopped.
 
     Returns
     -------

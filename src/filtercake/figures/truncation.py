@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from filtercake.crystals.csd import kept_classes
 from filtercake.figures import selection, style
+from filtercake.figures.selection import StudyData
+from filtercake.study.config.crystals import Csd
 from filtercake.units import MICROMETRE, FloatArray
-
-if TYPE_CHECKING:
-    from filtercake.figures.catalogue import StudyData
-    from filtercake.study.config.crystals import Csd
 
 MOST_PANELS = 4
 KEPT, DISCARDED = style.colour(0), style.colour(1)
@@ -64,7 +63,7 @@ def class_edges(size: FloatArray) -> FloatArray:
 def _panel(axes: Axes, data: StudyData, name: str) -> list[Line2D]:
     full, truncated = data.csds[name]
     threshold = data.study.csds[name].truncate_below_volume_fraction
-    kept = np.isin(full.size, truncated.size)
+    kept = kept_classes(full, truncated)
     edges, share = class_edges(full.size) / MICROMETRE, full.volume_fraction * 100.0
     for chosen, ink, label, gid in (
         (kept, KEPT, "packed", "kept"),

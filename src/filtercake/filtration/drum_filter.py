@@ -76,7 +76,7 @@ _ERGUN_INERTIAL: Final = 1.75
 
 
 class _Rule(NamedTuple):
-    """What a quantity may be; comparisons with nan are false, so no rule accepts it."""
+    """Range of a quantity; comparisons with nan are false, so that no rule accepts it."""
 
     accepts: Callable[[FloatArray], np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]
     text: str
@@ -134,7 +134,7 @@ class DrumFilter:
 
 @dataclass(frozen=True)
 class Cake:
-    """What packing and size distribution say of a cake.
+    """Properties of a cake from its packing and size distribution.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Cake:
 
     @property
     def known(self) -> bool:
-        """Whether there is a packing behind it."""
+        """Whether porosity and resistance are known."""
         return not (math.isnan(self.resistance) or math.isnan(self.porosity))
 
 
@@ -191,7 +191,7 @@ def area(drum: DrumFilter, resistance: ArrayLike, slurry_flow: ArrayLike) -> Flo
     Raises
     ------
     FilterError
-        If an argument is out of range or nan, or neither cake nor medium resists.
+        If an argument is out of range or nan, or neither cake nor medium resists; so do all functions here.
 
     Notes
     -----
@@ -203,22 +203,7 @@ def area(drum: DrumFilter, resistance: ArrayLike, slurry_flow: ArrayLike) -> Flo
 
 
 def capacity(drum: DrumFilter, resistance: ArrayLike, filter_area: ArrayLike) -> FloatArray:
-    """Slurry flow that a given area can filter, m3/s: the inverse of :func:`area`.
-
-    Parameters
-    ----------
-    drum : DrumFilter
-        The filter.
-    resistance : array_like
-        Specific cake resistance alpha, m/kg, zero or positive; broadcasts against ``filter_area``.
-    filter_area : array_like
-        Filter area A, m2, positive.
-
-    Raises
-    ------
-    FilterError
-        If an argument is out of range or nan, or neither cake nor medium resists.
-    """
+    """Slurry flow that a filter area (m2) can take, m3/s: the inverse of :func:`area`."""
     return np.asarray(_require("filter_area", filter_area, "m2", _POSITIVE) / _area_per_flow(drum, resistance))
 
 
@@ -226,11 +211,6 @@ def cake_mass_per_area(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
     """Cake mass per area and revolution, ``w = c V / (n A)``, kg/m2, on a drum of the area of eq. 10.
 
     It follows from the cake's resistance (m/kg) alone: area and flow are proportional.
-
-    Raises
-    ------
-    FilterError
-        If the resistance is negative, infinite or nan, or neither cake nor medium resists.
     """
     return np.asarray(drum.slurry_concentration / (drum.rotation_rate * _area_per_flow(drum, resistance)))
 
@@ -238,16 +218,7 @@ def cake_mass_per_area(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
 def cake_thickness(drum: DrumFilter, resistance: ArrayLike, porosity: ArrayLike, density: ArrayLike) -> FloatArray:
     """Thickness of the cake that leaves the drum, ``w / (rho (1 - eps))``, m.
 
-    Parameters
-    ----------
-    drum : DrumFilter
-        The filter.
-    resistance : array_like
-        Specific cake resistance alpha, m/kg; broadcasts against porosity and density.
-    porosity : array_like
-        Cake porosity, in (0, 1).
-    density : array_like
-        Crystal density, kg/m3.
+    Resistance (m/kg), porosity (0 to 1) and crystal density (kg/m3) broadcast against each other.
 
     Raises
     ------
@@ -260,29 +231,17 @@ def cake_thickness(drum: DrumFilter, resistance: ArrayLike, porosity: ArrayLike,
 def medium_share(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
     """Share of the medium in the overall resistance, ``Rm / (Rm + alpha w / 2)`` (paper, section 4.2).
 
-    The cake counts with half its final mass w, its mean while the cake grows at constant pressure. The share is
-    also the area the medium alone would need over the area needed.
-
-    Raises
-    ------
-    FilterError
-        If the resistance (m/kg) is negative, infinite or nan, or neither cake nor medium resists.
+    The cake counts with half its final mass w, its mean while the cake grows at constant pressure. The share is also
+    the area the medium alone would need over the area needed.
     """
     cake = 0.5 * np.asarray(resistance, dtype=np.float64) * cake_mass_per_area(drum, resistance)
     return np.asarray(drum.medium_resistance / (drum.medium_resistance + cake))
 
 
 def resistance_for_cake_share(drum: DrumFilter, share: ArrayLike) -> FloatArray:
-    """Specific cake resistance at which the cake holds a given share of the overall resistance, m/kg.
+    """Specific cake resistance at which the cake holds a share (in [0, 1)) of the overall resistance, m/kg.
 
     With ``s`` the share, eq. 10 and :func:`medium_share` give ``alpha = 2 mu n Rm^2 s / (dP f c (1 - s)^2)``.
-
-    Parameters
-    ----------
-    drum : DrumFilter
-        The filter; its medium must resist.
-    share : array_like
-        Share of the cake, in [0, 1).
 
     Raises
     ------
@@ -298,13 +257,7 @@ def resistance_for_cake_share(drum: DrumFilter, share: ArrayLike) -> FloatArray:
 
 
 def filtrate_velocity(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
-    """Superficial velocity of the filtrate while submerged, mean over the time, ``V / (f A)``, m/s.
-
-    Raises
-    ------
-    FilterError
-        If the resistance (m/kg) is negative, infinite or nan, or neither cake nor medium resists.
-    """
+    """Superficial velocity of the filtrate while submerged, mean over the time, ``V / (f A)``, m/s."""
     return np.asarray(1.0 / (drum.submerged_fraction * _area_per_flow(drum, resistance)))
 
 
@@ -317,23 +270,8 @@ def particle_reynolds(
 ) -> FloatArray:
     """Particle Reynolds number of the flow through the cake, ``rho_l u d32 / (mu (1 - eps))`` (packed-bed form).
 
-    Parameters
-    ----------
-    drum : DrumFilter
-        The filter.
-    resistance : array_like
-        Specific cake resistance alpha, m/kg; sets the velocity u of :func:`filtrate_velocity`.
-    porosity : array_like
-        Cake porosity, in (0, 1).
-    sauter_mean : array_like
-        Sauter mean diameter d32, m: six over the crystals' specific surface.
-    liquid_density : float
-        Density rho_l of the filtrate, kg/m3.
-
-    Raises
-    ------
-    FilterError
-        If an argument is out of range or nan.
+    The resistance (m/kg) sets the velocity u of :func:`filtrate_velocity`; porosity in (0, 1), Sauter mean diameter d32
+    (six over the crystals' specific surface) in m, density rho_l of the filtrate in kg/m3.
     """
     size = _require("sauter_mean", sauter_mean, "m", _POSITIVE)
     solids = 1.0 - _require("porosity", porosity, "", _FRACTION)
@@ -342,22 +280,14 @@ def particle_reynolds(
 
 
 def model_warnings(drum: DrumFilter, cake: Cake, liquid_density: float = WATER_DENSITY) -> list[str]:
-    """Say in plain words where filter or model leave their range; empty where all is well or no cake is known.
+    """Warnings where filter or model leave their range; empty where none do or no cake is known.
 
-    Parameters
-    ----------
-    drum : DrumFilter
-        The filter.
-    cake : Cake
-        The cake on it.
-    liquid_density : float
-        Density of the filtrate, kg/m3.
+    The density of the filtrate is in kg/m3.
 
     Raises
     ------
     FilterError
-        If the liquid's density is not positive, neither cake nor medium resists, or the slurry holds as many
-        crystals as the cake.
+        If that is not positive, neither cake nor medium resists, or the slurry holds as many crystals as the cake.
     """
     if not cake.known:
         return []
@@ -373,14 +303,14 @@ def model_warnings(drum: DrumFilter, cake: Cake, liquid_density: float = WATER_D
 def design_table(
     drum: DrumFilter, cakes: Sequence[Cake], slurry_flow: ArrayLike, liquid_density: float = WATER_DENSITY
 ) -> pd.DataFrame:
-    """Tabulate the filter that each cake needs.
+    """Tabulate the filter that each of n cakes needs; a cake that is not known gives a row of nan.
 
     Parameters
     ----------
     drum : DrumFilter
         The filter.
-    cakes : sequence of Cake, length n
-        One per row; a cake that is not known gives a row of nan.
+    cakes : sequence of Cake
+        One per row.
     slurry_flow : array_like, scalar or shape (n,)
         Slurry flow, m3/s.
     liquid_density : float
@@ -394,7 +324,7 @@ def design_table(
     Raises
     ------
     FilterError
-        As :func:`area`, :func:`cake_thickness` and :func:`particle_reynolds`; or if the flows are neither one nor n.
+        As :func:`area` and :func:`cake_thickness`; or if the flows are neither one nor n.
     """
     flows = _require("slurry_flow", slurry_flow, "m3/s", _POSITIVE)
     if flows.shape not in ((), (len(cakes),)):
@@ -490,7 +420,7 @@ def _require(name: str, value: ArrayLike, unit: str, rule: _Rule) -> FloatArray:
 
 
 def _problem(name: str, value: ArrayLike, unit: str, rule: _Rule) -> str | None:
-    """Say what is wrong with the first value a rule does not accept, None where it accepts all."""
+    """Message about the first value that a rule does not accept, None where it accepts all."""
     values = np.atleast_1d(np.asarray(value, dtype=np.float64))
     bad = values[~rule.accepts(values)]
     return f"{f'{name} = {bad[0]:g} {unit}'.rstrip()}: {rule.text}" if bad.size else None

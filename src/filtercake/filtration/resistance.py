@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from scipy import optimize
+import scipy
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 
@@ -67,7 +67,7 @@ def implied_porosity(resistance: float, csd: CrystalSizeDistribution, density: f
         porosity = 1.0 / (1.0 + math.exp(-odds))
         return math.log((1.0 - porosity) / porosity**3) - math.log(4.0) - ratio
 
-    root = float(optimize.brentq(excess, -30.0, 30.0, xtol=1e-14))
+    root = float(scipy.optimize.brentq(excess, -30.0, 30.0, xtol=1e-14))
     return 1.0 / (1.0 + math.exp(-root))
 
 

@@ -10,8 +10,9 @@ from filtercake.errors import PackingRejected
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.contacts import Contacts, find_contacts, floor_overlap, relative_overlap
+from filtercake.packing.engines import kind_of
 from filtercake.packing.result import SettledState
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import ENERGY_FRACTION, StopRule, stopped_falling
 from filtercake.packing.slab import bed_height, interior_slab, why_too_thin
 from filtercake.units import GRAVITY, FloatArray
@@ -31,29 +32,28 @@ STEADY_ENERGY = 0.8
 """Kinetic energy of the last tenth over that of the last half above which it is no longer falling."""
 
 
-def overlap_limit(spec: PackingSpec, radius: FloatArray) -> float:
+def overlap_limit(scene: Scene, radius: FloatArray) -> float:
     """Largest overlap of an acceptable packing of spheres (radii in m) over the diameter of the smaller sphere."""
-    equal = contact_law.relative_overlap(spec.cohesion, spec.youngs_modulus, spec.poisson_ratio)
     smallest, largest = float(radius.min()), float(radius.max())
-    modulus = contact_law.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
-    weight = spec.density * 4.0 / 3.0 * np.pi * largest**3 * GRAVITY
+    modulus = contact_law.effective_modulus(scene.youngs_modulus, scene.poisson_ratio)
+    weight = scene.density * 4.0 / 3.0 * np.pi * largest**3 * GRAVITY
     pressed = (weight / (4.0 / 3.0 * modulus * np.sqrt(smallest))) ** (2.0 / 3.0) / (2.0 * smallest)
-    return float(OVERLAP_FACTOR * 2.0 * equal + OVERLAP_ALLOWANCE + LOAD_FACTOR * pressed)
+    return float(OVERLAP_FACTOR * 2.0 * scene.relative_overlap + OVERLAP_ALLOWANCE + LOAD_FACTOR * pressed)
 
 
-def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule) -> dict[str, Any]:
+def accept(state: SettledState, scene: Scene, cloud: Cloud, rule: StopRule) -> dict[str, Any]:
     """Check a settled state and return what was measured on the way.
 
     Parameters
     ----------
     state : SettledState
-        What the engine returned.
-    spec : PackingSpec
+        Result of the engine.
+    scene : Scene
         What was asked for.
     cloud : Cloud
         The initial cloud.
     rule : StopRule
-        When a bed counts as settled.
+        Stop rule.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
     reasons += outside
     contacts = find_contacts(state.position, state.radius, state.length)
     deepest = _deepest(state, contacts)
-    limit = overlap_limit(spec, cloud.radius)
+    limit = overlap_limit(scene, cloud.radius)
     if deepest > limit:
         reasons.append(
             f"largest overlap {deepest:.3g} of the smaller diameter is over its limit {limit:.3g}: "
@@ -76,7 +76,7 @@ def accept(state: SettledState, spec: PackingSpec, cloud: Cloud, rule: StopRule)
     settled = is_settled(state, rule)
     if not settled:
         reasons.append(f"not settled after {state.steps:,} steps: {_why_unsettled(state)}")
-    if state.dangerous_builds and _keeps_the_rule(state):
+    if state.dangerous_builds and not kind_of(state.engine).fixed_steps:
         reasons.append(f"{state.dangerous_builds} neighbour lists were built late; use a larger skin_um")
     too_thin = why_too_thin(interior_slab(state.position, state.radius), state.radius)
     if too_thin:
@@ -90,9 +90,9 @@ def is_settled(state: SettledState, rule: StopRule) -> bool:
     """Whether the bed had come to rest, from the engine's record (never from its word)."""
     if state.trajectory.time.size < 2:
         return False
-    if _keeps_the_rule(state):
-        return rule.settled_at(state.trajectory) is not None
-    return stopped_falling(state.trajectory, FIXED_LENGTH_TOLERANCE)
+    if kind_of(state.engine).fixed_steps:
+        return stopped_falling(state.trajectory, FIXED_LENGTH_TOLERANCE)
+    return rule.settled_at(state.trajectory) is not None
 
 
 def _why_unsettled(state: SettledState) -> str:
@@ -156,7 +156,8 @@ def _incomplete(state: SettledState, cloud: Cloud) -> list[str]:
     recorded = np.concatenate([state.trajectory.mean_height, state.trajectory.kinetic_energy])
     if not np.isfinite(recorded).all():
         reasons.append("the settling record holds values that are not finite")
-    if not reasons and _keeps_the_rule(state) and not np.allclose(state.radius, cloud.radius, rtol=1e-9, atol=0.0):
+    from_cloud = not kind_of(state.engine).own_spheres
+    if not reasons and from_cloud and not np.allclose(state.radius, cloud.radius, rtol=1e-9, atol=0.0):
         reasons.append("the radii of the final state are not those of the initial cloud")
     return reasons
 
@@ -179,8 +180,3 @@ def _deepest(state: SettledState, contacts: Contacts) -> float:
     between = relative_overlap(contacts, state.radius)
     with_floor = floor_overlap(state.position, state.radius)
     return float(max(between.max(initial=0.0), with_floor.max(initial=0.0)))
-
-
-def _keeps_the_rule(state: SettledState) -> bool:
-    """Whether the engine starts from the cloud and stops by the rule; the as-published protocol does neither."""
-    return state.engine != "liggghts_as_published"

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
+from filtercake.packing.cloud import size_levels
 from filtercake.units import FloatArray, IntArray
 
 
@@ -29,25 +30,17 @@ class Contacts:
 def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Contacts:
     """Find every overlapping pair in a box periodic in x and y.
 
-    Spheres are searched by size level (factor 2), so that a wide distribution costs no more than its contacts.
-
-    Parameters
-    ----------
-    position : ndarray, shape (n, 3)
-        Centres, m.
-    radius : ndarray, shape (n,)
-        Radii, m.
-    length : float
-        Side of the periodic box, m.
+    Spheres are searched by size level, so that a wide distribution costs no more than its contacts. Positions (n, 3),
+    radii (n,) and the side of the box in m.
     """
     wrapped = position.copy()
     wrapped[:, :2] %= length
     wrapped[:, :2][wrapped[:, :2] >= length] = 0.0
     wrapped[:, 2] -= wrapped[:, 2].min()
     box = np.array([length, length, 0.0])
-    level = np.floor(np.log2(radius.max() / radius)).astype(np.int64)
+    level = size_levels(radius)
     members = [np.flatnonzero(level == k) for k in np.unique(level)]
-    trees = [cKDTree(wrapped[m], boxsize=box) for m in members]
+    trees = [scipy.spatial.cKDTree(wrapped[m], boxsize=box) for m in members]
     first, second, depth = [], [], []
     for a, coarse in enumerate(members):
         for b in range(a, len(members)):

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
 from filtercake.packing.cloud import Cloud, make_cloud
 from filtercake.packing.engines import Engine, SettleRequest, get_engine
 from filtercake.packing.result import Packing, SettledState, read_sealed, sealed, sha256, write_json
-from filtercake.packing.scene import PackingSpec, digest, stage_seed
+from filtercake.packing.scene import Scene, digest, stage_seed
 from filtercake.packing.settling import StopRule
 
 ATTEMPTS = 3
@@ -24,11 +23,12 @@ WORK = ".work"
 """Scratch folder of a point's packings."""
 
 Report = Callable[[str], None]
+"""Receives a line of progress."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one replicate.
+    """Outcome of one replicate.
 
     Attributes
     ----------
@@ -37,13 +37,13 @@ class Outcome:
     status : {"ok", "failed"}
         Whether there is an accepted packing.
     reason : str
-        Why not; empty where there is one.
+        Reason of the failure; empty for an accepted packing.
     seed : int
         Seed of the initial cloud.
     sha256 : str
         Checksum of the geometry file; empty where there is none.
     attempts : int
-        How often it was tried.
+        Number of attempts.
     may_pass : bool
         Whether it failed for a reason outside the packing (program killed or missing, disk full, time limit), so that
         another run may make it.
@@ -58,19 +58,18 @@ class Outcome:
     may_pass: bool = False
 
 
-def cloud_seed(spec: PackingSpec, csd: CrystalSizeDistribution, replicate: int) -> int:
+def cloud_seed(scene: Scene, replicate: int) -> int:
     """Seed of a replicate's cloud.
 
     It follows from what the cloud is made of, not from friction, cohesion or engine: common random numbers
     make the differences between those sharp.
     """
-    classes = [[f"{size:.12e}" for size in csd.size], [f"{x:.12e}" for x in csd.volume_fraction]]
-    return stage_seed(spec.seed, classes, spec.particles, spec.initial_void_fraction, replicate, "cloud")
+    classes = [[f"{size:.12e}" for size in scene.csd.size], [f"{x:.12e}" for x in scene.csd.volume_fraction]]
+    return stage_seed(scene.seed, classes, scene.particles, scene.initial_void_fraction, replicate, "cloud")
 
 
 def pack(
-    spec: PackingSpec,
-    csd: CrystalSizeDistribution,
+    scene: Scene,
     replicate: int,
     folder: Path,
     *,
@@ -82,50 +81,46 @@ def pack(
 
     Parameters
     ----------
-    spec : PackingSpec
-        Material, time step, protocol.
-    csd : CrystalSizeDistribution
-        The truncated distribution.
+    scene : Scene
+        Distribution, material, time step, protocol.
     replicate : int
         Number of the replicate; decides the seed.
     folder : Path
         Empty scratch folder for the engine's files.
-    engine : Engine, optional
-        Used instead of the one the spec names.
-    progress : callable
-        Takes a line about a long packing.
+    engine, progress : Engine, callable, optional
+        Used instead of the engine that the scene names; receives a line about a long packing.
     state_file : Path, optional
-        Where a long packing keeps its state, to go on from there when it was stopped.
+        Keeps the state of a long packing, which goes on from there when it was stopped.
 
     Raises
     ------
     CloudError, EngineError, PackingRejected
         If the spheres cannot be placed, the engine fails, or its result is not acceptable.
     """
-    settled = settle(spec, csd, replicate, folder, engine=engine, progress=progress, state_file=state_file)
+    settled = settle(scene, replicate, folder, engine=engine, progress=progress, state_file=state_file)
     state = settled.state
     diagnostics = {
-        **accept(state, spec, settled.cloud, settled.rule),
+        **accept(state, scene, settled.cloud, settled.rule),
         "replicate": replicate,
         "seed": settled.seed,
-        "rayleigh_fraction": spec.rayleigh_fraction(csd.smallest),
-        "spec": spec.as_dict(),
+        "rayleigh_fraction": scene.rayleigh_fraction,
+        "scene": scene.as_dict(),
     }
     return Packing(state.position, state.radius, state.length, diagnostics)
 
 
 @dataclass(frozen=True)
 class Settled:
-    """What an engine made of a cloud, accepted or not.
+    """Result of an engine with what it started from, accepted or not.
 
     Attributes
     ----------
     state : SettledState
         The engine's result.
     cloud : Cloud
-        What it started from.
+        Initial cloud.
     rule : StopRule
-        When the bed was to stop.
+        Stop rule.
     seed : int
         Seed of the cloud.
     """
@@ -137,8 +132,7 @@ class Settled:
 
 
 def settle(
-    spec: PackingSpec,
-    csd: CrystalSizeDistribution,
+    scene: Scene,
     replicate: int,
     folder: Path,
     *,
@@ -153,16 +147,15 @@ def settle(
     CloudError, EngineError
         If the spheres cannot be placed, or the engine fails.
     """
-    seed = cloud_seed(spec, csd, replicate)
-    cloud = make_cloud(csd, spec.particles, spec.initial_void_fraction, seed, spec.bed_depth_factor)
-    rule = StopRule.for_bed(spec, cloud.length)
-    request = SettleRequest(spec, csd, cloud, rule, stage_seed(seed, "engine"), folder, progress, state_file)
-    return Settled((engine or get_engine(spec.engine)).settle(request), cloud, rule, seed)
+    seed = cloud_seed(scene, replicate)
+    cloud = make_cloud(scene.csd, scene.particles, scene.initial_void_fraction, seed, scene.bed_depth_factor)
+    rule = StopRule.for_bed(scene, cloud.length)
+    request = SettleRequest(scene, cloud, rule, stage_seed(seed, "engine"), folder, progress, state_file)
+    return Settled((engine or get_engine(scene.engine)).settle(request), cloud, rule, seed)
 
 
 def pack_replicates(
-    spec: PackingSpec,
-    csd: CrystalSizeDistribution,
+    scene: Scene,
     replicates: int,
     folder: Path,
     code: str,
@@ -170,25 +163,21 @@ def pack_replicates(
     progress: Report = lambda _: None,
     enough: Callable[[Path], bool] = lambda _: False,
 ) -> list[Outcome]:
-    """Make a point's replicates in ``folder`` and write their manifest last.
+    """Make the replicates of a point in ``folder`` and write their manifest last.
 
-    Finished replicates are kept when the same point is run again, unless the spec, the distribution or the
-    code changed; a packing that fails is an outcome with a reason, not an error.
+    Finished replicates are kept when the same point is run again, unless what decides the packing or the code (whose
+    hash is ``code``) changed; a packing that fails is an outcome with a reason, not an error.
 
     Parameters
     ----------
-    spec, csd
+    scene, progress
         As for :func:`pack`.
     replicates : int
-        How many, at most.
+        Largest number of packings.
     folder : Path
         Receives r<k>.npz, r<k>.json and the manifest.
-    code : str
-        Hash of the code and decks behind the packing.
     report : callable
-        Called with the outcome of every packing that is made, and its record, as it comes.
-    progress : callable
-        Takes a line about a long packing, or one that is kept.
+        Receives the outcome of every packing that is made, and its record.
     enough : callable
         Called with the geometry file of every accepted packing; says whether no further one is needed.
 
@@ -197,8 +186,8 @@ def pack_replicates(
     EngineMissing
         If the engine is not installed: no replicate could be made.
     """
-    key = point_key(code, spec, csd)
-    engine = get_engine(spec.engine)
+    key = point_key(code, scene)
+    engine = get_engine(scene.engine)
     work = folder / WORK
     shutil.rmtree(work, ignore_errors=True)
     outcomes = []
@@ -209,7 +198,7 @@ def pack_replicates(
             outcome = kept[0]
             progress(f"r{replicate} is kept")
         else:
-            outcome, record = _attempt(spec, csd, replicate, npz, key, engine, work, progress)
+            outcome, record = _attempt(scene, replicate, npz, key, engine, work, progress)
             report(outcome, record)
         outcomes.append(outcome)
         if outcome.status == "ok" and enough(npz):
@@ -219,9 +208,9 @@ def pack_replicates(
     return outcomes
 
 
-def point_key(code: str, spec: PackingSpec, csd: CrystalSizeDistribution) -> str:
+def point_key(code: str, scene: Scene) -> str:
     """Hash of all that a point's packings follow from."""
-    return digest(code, spec.as_dict(), csd.size.tolist(), csd.volume_fraction.tolist())
+    return digest(code, scene.decisive())
 
 
 def finished(npz: Path, key: str, replicate: int) -> tuple[Outcome, dict[str, Any]] | None:
@@ -268,8 +257,7 @@ def _may_pass(error: Exception) -> bool:
 
 
 def _attempt(
-    spec: PackingSpec,
-    csd: CrystalSizeDistribution,
+    scene: Scene,
     replicate: int,
     npz: Path,
     key: str,
@@ -277,22 +265,23 @@ def _attempt(
     work: Path,
     progress: Report,
 ) -> tuple[Outcome, dict[str, Any]]:
-    seed = cloud_seed(spec, csd, replicate)
+    seed = cloud_seed(scene, replicate)
     state_file = _state_file(npz, key)
     for attempt in range(1, ATTEMPTS + 1):
         scratch = work / f"r{replicate}"
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
         try:
-            made = pack(spec, csd, replicate, scratch, engine=engine, progress=progress, state_file=state_file)
+            made = pack(scene, replicate, scratch, engine=engine, progress=progress, state_file=state_file)
         except EngineMissing:
             raise
         except (CloudError, EngineError, PackingRejected) as error:
             if getattr(error, "transient", False) and attempt < ATTEMPTS:
                 progress(f"replicate {replicate}: {error}; trying again")
                 continue
-            _keep_evidence(scratch, npz)
-            state_file.unlink(missing_ok=True)
+            _keep_evidence(scratch, npz, engine.evidence)
+            if not getattr(error, "transient", False):  # what was stopped goes on from there when it is given more
+                state_file.unlink(missing_ok=True)
             return Outcome(replicate, "failed", str(error), seed, "", attempt, _may_pass(error)), {}
         record = {**made.diagnostics, "key": key, "attempts": attempt}
         checksum = Packing(made.position, made.radius, made.length, record).save(npz)
@@ -311,12 +300,12 @@ def _state_file(npz: Path, key: str) -> Path:
     return wanted
 
 
-def _keep_evidence(scratch: Path, npz: Path) -> None:
-    """Keep the deck and the engine's output of a failed packing; drop what an earlier run left for it."""
+def _keep_evidence(scratch: Path, npz: Path, names: Iterable[str]) -> None:
+    """Keep the engine's input and output of a failed packing; drop what an earlier run left for it."""
     kept = npz.with_suffix(".failed")
     shutil.rmtree(kept, ignore_errors=True)
     kept.mkdir(parents=True)
-    for name in ("packing.in", "cloud.data", "screen.log"):
+    for name in names:
         if (scratch / name).exists():
             shutil.move(scratch / name, kept / name)
     npz.unlink(missing_ok=True)

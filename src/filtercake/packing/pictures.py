@@ -12,14 +12,7 @@ from filtercake.units import MICROMETRE, FloatArray
 def write_vtk(path: Path, position: FloatArray, velocity: FloatArray, radius: FloatArray) -> None:
     """Write spheres as VTK points with radius and velocity; lengths in um, velocities in m/s.
 
-    Parameters
-    ----------
-    path : Path
-        File to write.
-    position, velocity : ndarray, shape (n, 3)
-        Centres, m, and velocities, m/s.
-    radius : ndarray, shape (n,)
-        Radii, m.
+    Positions (n, 3) and radii (n,) are given in m, velocities (n, 3) in m/s.
     """
     n = radius.size
     with path.open("w", encoding="ascii") as stream:

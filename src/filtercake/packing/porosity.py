@@ -8,7 +8,7 @@ import numpy as np
 
 from filtercake.packing import contact_law
 from filtercake.packing.result import Packing
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.slab import Slab, bed_height, interior_slab
 from filtercake.units import FloatArray
 
@@ -41,12 +41,7 @@ class PorosityResult:
 def volume_below(height: float | FloatArray, centre: FloatArray, radius: FloatArray) -> FloatArray:
     """Volume of spheres below a horizontal plane, m3, in closed form (spherical cap).
 
-    Parameters
-    ----------
-    height : float or ndarray
-        Height of the plane, m; broadcasts against ``centre``.
-    centre, radius : ndarray
-        Heights of the centres and radii, m, of broadcastable shapes.
+    The heights of plane and centres and the radii, all in m, broadcast against each other.
     """
     depth = np.clip(height - centre + radius, 0.0, 2.0 * radius)
     return np.asarray(np.pi / 3.0 * depth**2 * (3.0 * radius - depth))
@@ -55,25 +50,13 @@ def volume_below(height: float | FloatArray, centre: FloatArray, radius: FloatAr
 def slab_porosity(position: FloatArray, radius: FloatArray, length: float, slab: Slab) -> float:
     """Exact porosity between two heights: spheres clipped by the slab's faces in closed form.
 
-    Parameters
-    ----------
-    position : ndarray, shape (n, 3)
-        Centres, m.
-    radius : ndarray, shape (n,)
-        Radii, m.
-    length : float
-        Side of the periodic box, m.
-    slab : Slab
-        Lower and upper height, m.
+    Positions (n, 3), radii (n,) and the side of the periodic box in m. Overlaps count twice, as in every published
+    porosity of such beds; :func:`filtercake.packing.contact_law.soft_contact_compaction` says how much that is.
 
     Raises
     ------
     ValueError
         If the slab has no thickness.
-
-    Notes
-    -----
-    Overlaps count twice, as in every published porosity of such beds; :func:`compaction` says how much that is.
     """
     if slab.thickness <= 0.0:
         raise ValueError(f"the slab {slab.lower:g}..{slab.upper:g} m has no thickness")
@@ -95,29 +78,15 @@ def paper_count_porosity(
 
 
 def porosity_profile(position: FloatArray, radius: FloatArray, length: float, edges: FloatArray) -> FloatArray:
-    """Exact porosity of each slice between consecutive heights.
+    """Exact porosity of each slice between consecutive heights ``edges`` (m + 1,), shape (m,).
 
-    Parameters
-    ----------
-    position : ndarray, shape (n, 3)
-        Centres, m.
-    radius : ndarray, shape (n,)
-        Radii, m.
-    length : float
-        Side of the periodic box, m.
-    edges : ndarray, shape (m + 1,)
-        Ascending heights, m.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Porosities.
+    Positions (n, 3), radii (n,), the side of the periodic box and the ascending edges in m.
     """
     below = np.array([volume_below(edge, position[:, 2], radius).sum() for edge in edges])
     return np.asarray(1.0 - np.diff(below) / (length**2 * np.diff(edges)))
 
 
-def measure(packing: Packing, spec: PackingSpec) -> PorosityResult:
+def measure(packing: Packing, scene: Scene) -> PorosityResult:
     """Measure all porosities of an accepted packing."""
     position, radius, length = packing.position, packing.radius, packing.length
     slab = interior_slab(position, radius)
@@ -125,9 +94,9 @@ def measure(packing: Packing, spec: PackingSpec) -> PorosityResult:
     return PorosityResult(
         interior=interior,
         from_floor=slab_porosity(position, radius, length, Slab(0.0, min(length, bed_height(position, radius)))),
-        paper_count=paper_count_porosity(position, radius, length, spec.bed_depth_factor),
+        paper_count=paper_count_porosity(position, radius, length, scene.bed_depth_factor),
         compaction=contact_law.soft_contact_compaction(
-            interior, spec.cohesion, spec.youngs_modulus, spec.poisson_ratio
+            interior, scene.cohesion, scene.youngs_modulus, scene.poisson_ratio
         ),
         slab=slab,
     )

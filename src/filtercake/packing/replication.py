@@ -9,7 +9,7 @@ from scipy import special
 
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.units import FloatArray
 
 CONFIDENCE = 0.95
@@ -44,25 +44,15 @@ class UntilNarrow:
     normal porosities are covered in 94 to 99 % of cases, whatever the spread.
     """
 
-    def __init__(self, spec: PackingSpec, interval: float, least: int = LEAST_REPLICATES):
-        """Ask for an interval.
-
-        Parameters
-        ----------
-        spec : PackingSpec
-            What is packed.
-        interval : float
-            Half-width asked for of the 95 % interval of the mean interior porosity.
-        least : int
-            Packings to make in any case.
-        """
-        self.spec, self.interval, self.least = spec, interval, max(least, LEAST_REPLICATES)
+    def __init__(self, scene: Scene, interval: float, least: int = LEAST_REPLICATES):
+        """Ask for a half-width of the 95 % interval of the mean interior porosity, with at least so many packings."""
+        self.scene, self.interval, self.least = scene, interval, max(least, LEAST_REPLICATES)
         self.values: list[float] = []
         self.narrow = 0
 
     def __call__(self, npz: Path) -> bool:
         """Take one more accepted packing into account; say whether that is enough."""
-        return self.add(measure(Packing.load(npz), self.spec).interior)
+        return self.add(measure(Packing.load(npz), self.scene).interior)
 
     def add(self, porosity: float) -> bool:
         """Take one more porosity into account; say whether that is enough."""

@@ -29,7 +29,7 @@ SEAL = "seal"
 
 @dataclass(frozen=True)
 class SettledState:
-    """What an engine hands back, not yet accepted.
+    """Result of an engine, not yet accepted.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class SettledState:
     dangerous_builds : int
         Neighbour lists the engine itself calls late.
     engine, engine_version : str
-        Who did it.
+        Engine name and version.
     warnings : tuple of str
         The engine's own warnings.
     wall_time : float

@@ -1,4 +1,4 @@
-"""What one packing is made of: everything that decides its outcome, in SI units, and nothing else."""
+"""What one packing is made of: everything that decides its outcome, in SI units, and how it is run."""
 
 from __future__ import annotations
 
@@ -6,19 +6,30 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final
 
+import numpy as np
+
+from filtercake.crystals.csd import CrystalSizeDistribution
+from filtercake.errors import shown
 from filtercake.packing import contact_law
+from filtercake.packing.cloud import NARROW, PLACEMENT_HEIGHT, box_length
 from filtercake.units import GRAVITY
 
+INCIDENTAL: Final = ("processes", "time_limit", "write_vtk")
+"""What does not decide a packing: it stands whatever these become."""
+_KINDS: Final = {"int": (int,), "float": (int, float), "str": (str,), "bool": (bool,)}
 
-@dataclass(frozen=True)
-class PackingSpec:
-    """One point of a study as an engine sees it (the crystal size distribution travels beside it).
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One point of a study as an engine sees it; two scenes are equal when they make the same packings.
 
     Attributes
     ----------
+    csd : CrystalSizeDistribution
+        The (truncated) distribution that is packed.
     particles : int
         Number of spheres N.
     initial_void_fraction : float
@@ -45,16 +56,17 @@ class PackingSpec:
         Give up (unsettled) after this many free-fall times of the highest sphere.
     skin : float
         Neighbour skin, m; 0 lets the engine choose.
-    processes : int
-        MPI processes for one packing; 0 lets the engine choose by size.
-    time_limit : float
-        Wall-clock limit of one packing, s; 0 for none.
     bed_depth_factor : float
         How many times deeper than the paper's the bed is, in units of its box side.
+    processes : int
+        MPI processes or threads for one packing; 0 lets the engine choose by size.
+    time_limit : float
+        Wall-clock limit of one packing, s; 0 for none.
     write_vtk : bool
         Whether to keep pictures of the settling for ParaView.
     """
 
+    csd: CrystalSizeDistribution
     particles: int
     initial_void_fraction: float
     settling_velocity: float
@@ -70,25 +82,90 @@ class PackingSpec:
     porosity_tolerance: float = 1e-4
     max_fall_times: float = 4.0
     skin: float = 0.0
+    bed_depth_factor: float = 1.0
     processes: int = 0
     time_limit: float = 0.0
-    bed_depth_factor: float = 1.0
     write_vtk: bool = False
 
+    def __eq__(self, other: object) -> bool:
+        """Whether both make the same packings."""
+        return isinstance(other, Scene) and self.decisive() == other.decisive()
+
+    def __hash__(self) -> int:
+        """Hash of what decides the packing."""
+        return hash(digest(self.decisive()))
+
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> PackingSpec:
-        """Build a spec from plain values, e.g. a rule's params."""
-        return cls(**values)
+    def from_dict(cls, values: Mapping[str, Any]) -> Scene:
+        """Build a scene from plain values: all or the decisive ones, to the last bit.
+
+        Raises
+        ------
+        CsdError, OverflowError, TypeError, ValueError
+            If a value is missing, unknown, or not of its kind.
+        """
+        given = dict(values)
+        try:
+            size, share = (np.array(given.pop(name), dtype=np.float64) for name in ("size", "volume_fraction"))
+        except KeyError as error:
+            raise ValueError(f"{error.args[0]} is missing") from None
+        for field in fields(cls)[1:]:
+            value = given.get(field.name, field.default)
+            if type(value) not in _KINDS[str(field.type)] or not (isinstance(value, str) or math.isfinite(value)):
+                raise ValueError(f"{field.name} = {shown(value)}: must be a finite {field.type}")
+        checked = CrystalSizeDistribution.from_classes(size, share)
+        # not the checked one, whose fractions are normalised anew: the last digits decide the cloud
+        exact = np.array_equal(checked.size, size)
+        return cls(CrystalSizeDistribution(size, share) if exact else checked, **given)
+
+    def decisive(self) -> dict[str, Any]:
+        """Return all that decides the packing, as plain values: the point's name, key and reruns follow from it."""
+        numbers = {name: value for name, value in vars(self).items() if name not in ("csd", *INCIDENTAL)}
+        return {**numbers, "size": self.csd.size.tolist(), "volume_fraction": self.csd.volume_fraction.tolist()}
+
+    def incidental(self) -> dict[str, Any]:
+        """Return what does not decide the packing, as plain values."""
+        return {name: getattr(self, name) for name in INCIDENTAL}
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain Python values, fit for JSON and rule params."""
-        return asdict(self)
+        """Return everything as plain values."""
+        return {**self.decisive(), **self.incidental()}
 
-    def rayleigh_fraction(self, smallest_diameter: float) -> float:
-        """Time step over the Rayleigh time step of the smallest sphere (m)."""
-        return self.time_step / contact_law.rayleigh_time_step(
-            0.5 * smallest_diameter, self.density, self.youngs_modulus, self.poisson_ratio
+    @property
+    def rayleigh_time_step(self) -> float:
+        """Rayleigh time step of the smallest sphere, s."""
+        return contact_law.rayleigh_time_step(
+            0.5 * self.csd.smallest, self.density, self.youngs_modulus, self.poisson_ratio
         )
+
+    @property
+    def rayleigh_fraction(self) -> float:
+        """Time step over the Rayleigh time step of the smallest sphere."""
+        return self.time_step / self.rayleigh_time_step
+
+    def with_time_step(self, rayleigh_fraction: float) -> Scene:
+        """Return the same scene at a time step given over the Rayleigh time step of its smallest sphere."""
+        return replace(self, time_step=rayleigh_fraction * self.rayleigh_time_step)
+
+    @property
+    def relative_overlap(self) -> float:
+        """Equilibrium overlap of equal spheres over their diameter."""
+        return contact_law.relative_overlap(self.cohesion, self.youngs_modulus, self.poisson_ratio)
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether the distribution is so broad that its bed and neighbour lists are another matter."""
+        return self.csd.largest > NARROW * self.csd.smallest
+
+    @property
+    def box_length(self) -> float:
+        """Side of the periodic box, m."""
+        return box_length(self.csd, self.particles, self.initial_void_fraction, self.bed_depth_factor)
+
+    @property
+    def cloud_height(self) -> float:
+        """Height of the region the spheres start in, m."""
+        return PLACEMENT_HEIGHT * self.bed_depth_factor * self.box_length
 
     def free_fall_time(self, height: float) -> float:
         """Time a sphere needs from ``height`` (m) to the floor, s."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from filtercake.packing.cloud import PLACEMENT_HEIGHT
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.units import FloatArray
 
 CHECKS_PER_FALL = 40
@@ -73,14 +73,14 @@ class StopRule:
     calm_checks: int = CALM_CHECKS
 
     @classmethod
-    def for_bed(cls, spec: PackingSpec, length: float) -> StopRule:
+    def for_bed(cls, scene: Scene, length: float) -> StopRule:
         """Scale the rule to a box of side ``length`` (m)."""
-        fall_time = spec.free_fall_time(PLACEMENT_HEIGHT * spec.bed_depth_factor * length)
-        check_steps = max(1, round(fall_time / CHECKS_PER_FALL / spec.time_step))
+        fall_time = scene.free_fall_time(PLACEMENT_HEIGHT * scene.bed_depth_factor * length)
+        check_steps = max(1, round(fall_time / CHECKS_PER_FALL / scene.time_step))
         return cls(
             check_steps=check_steps,
-            max_checks=max(CALM_CHECKS, round(CHECKS_PER_FALL * spec.max_fall_times)),
-            height_tolerance=spec.porosity_tolerance / TYPICAL_SOLIDS,
+            max_checks=max(CALM_CHECKS, round(CHECKS_PER_FALL * scene.max_fall_times)),
+            height_tolerance=scene.porosity_tolerance / TYPICAL_SOLIDS,
         )
 
     def is_calm(self, heights: FloatArray, energy: float, peak_energy: float) -> bool:

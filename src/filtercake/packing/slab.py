@@ -1,4 +1,4 @@
-"""How high a bed stands and which part of it is its interior."""
+"""Height of a bed and its interior slab."""
 
 from __future__ import annotations
 

@@ -9,11 +9,13 @@ from typing import Any
 import pandas as pd
 from PIL import Image
 
+from filtercake.crystals.csd import kept_volume
 from filtercake.figures import calibrated, selection
 from filtercake.figures.calibrated import CalibrationData
-from filtercake.figures.catalogue import FOOTER, StudyData
+from filtercake.figures.cohesion import FREE
 from filtercake.figures.filtered import filtered
-from filtercake.figures.porosity_cohesion import FREE
+from filtercake.figures.selection import StudyData
+from filtercake.figures.style import FOOTER
 from filtercake.packing.result import publish
 from filtercake.report.pages import engine_names, environment
 from filtercake.report.words import heading, number, with_interval
@@ -170,8 +172,7 @@ def _filter(data: StudyData) -> list[dict[str, Any]]:
 def _truncated(data: StudyData) -> Iterable[tuple[str, float, int]]:
     for name, (full, packed) in data.csds.items():
         if name in data.study.csds and data.study.csds[name].truncation:
-            kept = full.volume_fraction[[size in set(packed.size) for size in full.size]]
-            yield name, float(kept.sum()), packed.size.size
+            yield name, kept_volume(full, packed), packed.size.size
 
 
 def calibration_values(data: CalibrationData) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Which pages a study or calibration has in the report, and what each says before its table."""
+"""Pages of a study or calibration in the report: titles, introductions and tables."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ TABLES, FAILED, PROVENANCE = "Tables", "Failed packings", "Provenance"
 
 @dataclass(frozen=True)
 class PageSpec:
-    """A page's part of the report, its title, and what it says before its table.
+    """A page's part of the report, its title, and its introduction.
 
     Attributes
     ----------
@@ -19,7 +19,7 @@ class PageSpec:
     title : str
         Title.
     lead : str
-        What the table holds.
+        Introductory prose.
     file : str
         CSV below the study's folder; empty for a page that has none.
     """

@@ -12,18 +12,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 
 def to_html(text: str) -> str:
-    """Convert Markdown to HTML.
-
-    Parameters
-    ----------
-    text : str
-        CommonMark with tables; formulas in LaTeX between dollars. HTML in it is shown as text.
-
-    Returns
-    -------
-    str
-        The inside of a page's body.
-    """
+    """Convert CommonMark with tables, and LaTeX between dollars, to the body of an HTML page; HTML becomes text."""
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.use(dollarmath_plugin, renderer=_formula)
     tokens = parser.parse(text)
@@ -38,7 +27,7 @@ def _formula(latex: str, options: dict[str, Any]) -> str:
 
 
 def _unlink(tokens: Sequence[Token]) -> None:
-    """Turn links to other files of the project into text: a report has no such files beside it."""
+    """Replace links to other files of the project by text: a report has no such files beside it."""
     local = False
     for token in tokens:
         if token.type == "link_open":

@@ -11,23 +11,24 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from filtercake.figures import style
+from filtercake.packing.engines import label_of
 from filtercake.packing.result import publish
 from filtercake.report import words
 from filtercake.report.catalogue import PAGES
 from filtercake.study.config.study import Study
+from filtercake.user_files import templates
 
 FAILED_COLUMNS = ("point", "replicate", "csd", "cohesion_kJ_m3", "friction", "engine", "reason")
 
 
 @dataclass(frozen=True)
 class Content:
-    """What a page shows below its title.
+    """Content of a page below its title.
 
     Attributes
     ----------
     lead : str
-        What it holds, in prose.
+        Introductory prose.
     table : DataFrame
         Its table, empty for none.
     csv : bytes
@@ -44,11 +45,11 @@ class Content:
 
 def engine_names(engines: Iterable[str]) -> str:
     """Names of engines for readers, each once."""
-    return ", ".join(style.ENGINES.get(name, name) for name in sorted(set(engines)))
+    return ", ".join(label_of(name) for name in sorted(set(engines)))
 
 
 def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Mapping[str, Any]) -> dict[str, Content]:
-    """Collect the pages of a study or a calibration.
+    """Collect the pages of a study or a calibration, by the names of :data:`filtercake.report.catalogue.PAGES`.
 
     Parameters
     ----------
@@ -60,11 +61,6 @@ def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Map
         The study that was packed.
     provenance : mapping
         As ``provenance.json`` holds it (versions, machine, commit).
-
-    Returns
-    -------
-    dict of str to Content
-        By the names of :data:`filtercake.report.catalogue.PAGES`.
     """
     found = {}
     for name, spec in PAGES.items():
@@ -101,7 +97,7 @@ def failed(packings: pd.DataFrame) -> Content:
 
 
 def origin(packings: pd.DataFrame, provenance: Mapping[str, Any]) -> Content:
-    """Say what made the results: engine, versions, machine, commit, and the seed of every packing."""
+    """Tabulate the origin of the results: engine, versions, machine, commit, and the seed of every packing."""
     versions = pd.DataFrame(provenance["versions"].items(), columns=["package", "version"])
     machine = pd.DataFrame(provenance["machine"].items(), columns=["machine", "value"])
     lead = (
@@ -113,17 +109,7 @@ def origin(packings: pd.DataFrame, provenance: Mapping[str, Any]) -> Content:
 
 
 def write(template: Path, pages: Mapping[str, Content], target: Path) -> None:
-    """Write pages as HTML, each named as in :data:`filtercake.report.catalogue.PAGES`.
-
-    Parameters
-    ----------
-    template : Path
-        Template of all pages.
-    pages : mapping of str to Content
-        The pages.
-    target : Path
-        Folder to write to.
-    """
+    """Write pages as HTML into ``target``, each named as in :data:`filtercake.report.catalogue.PAGES`."""
     for name, content in pages.items():
         with publish(target / f"{name}.html") as temporary:
             temporary.write_text(render(template, PAGES[name].title, content), encoding="utf-8")
@@ -140,14 +126,8 @@ def prose(template: Path, title: str, body: str) -> str:
 
 
 def environment(folder: Path) -> jinja2.Environment:
-    """Templates of HTML in a folder: what they are given is text, and names that do not exist are errors."""
-    made = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
+    """Return the HTML templates of a folder, with the filters they use."""
+    made = templates(folder, html=True)
     made.filters |= {
         "readable": words.readable,
         "number": words.number,

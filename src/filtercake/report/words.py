@@ -7,7 +7,8 @@ import re
 
 import pandas as pd
 
-from filtercake.figures.style import ENGINES, power_of_ten, scientific
+from filtercake.figures.style import power_of_ten, scientific
+from filtercake.packing.engines import label_of
 
 UNITS = {
     "kJ_m3": "kJ/m³",
@@ -79,14 +80,9 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def with_interval(value: float, half: float, unit: str = "") -> str:
-    """Write a value and the half-width of its 95 % interval, with two digits of the latter.
+    """Write a value and the half-width of its 95 % interval, with two digits of the latter, and their unit.
 
-    Parameters
-    ----------
-    value, half : float
-        In the unit; a half-width that is not finite (a single packing) is left out.
-    unit : str
-        Written behind.
+    A half-width that is not finite (a single packing) is left out.
     """
     behind = f" {unit}" if unit else ""
     if not (math.isfinite(half) and math.isfinite(value) and half > 0.0):
@@ -108,12 +104,9 @@ def cell(value: object) -> str:
 
 
 def readable(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of a table for readers: intervals stand beside their values, empty columns are left out.
+    """Headings and rows of a table for readers; empty columns are left out.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns named like those of ``summary.csv``; ``x_ci95_unit`` is the half-width of ``x_unit``.
+    The half-width of an interval, ``x_ci95_unit``, stands beside its value, ``x_unit``.
     """
     halves = {interval_owner(name): name for name in table.columns if INTERVAL in name}
     halves = {owner: name for owner, name in halves.items() if owner in table.columns}
@@ -125,7 +118,7 @@ def readable(table: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
         [
             with_interval(float(row[name]), float(row[halves[name]]))
             if name in halves
-            else cell(ENGINES.get(row[name], row[name]) if name == "engine" else row[name])
+            else cell(label_of(row[name]) if name == "engine" else row[name])
             for name in shown
         ]
         for row in table.to_dict("records")

@@ -7,7 +7,8 @@ import pandas as pd
 
 from filtercake.errors import FilterError
 from filtercake.filtration.drum_filter import Cake, DrumFilter, area, design_table
-from filtercake.results.paper_tables import Csds, published_value
+from filtercake.results.paper_tables import Csds, published_number
+from filtercake.study.config.filter import Filter
 from filtercake.study.config.study import Study
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
 
@@ -15,12 +16,9 @@ from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
 def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     """Tabulate the drum filter that every point's slurry needs (paper, eq. 10 and Fig. 14).
 
-    Returns
-    -------
-    DataFrame
-        Per point: crystallizer volume, porosity and resistance, the columns of
-        :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 %
-        interval, and the published area.
+    The columns are crystallizer volume, porosity and resistance, those of
+    :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 % interval,
+    and the published area.
 
     Raises
     ------
@@ -49,8 +47,7 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
         ends = (table["resistance_m_kg"] + sign * table["resistance_ci95_m_kg"]).clip(lower=smallest)
         known = ends.notna()
         table.loc[known, name] = area(drum, ends[known].to_numpy(np.float64), flow)
-    published = (published_value(study, name, "filter_area_m2", "simulation") for name in names)
-    table["published_area_m2"] = [float("nan") if entry is None else entry.value for entry in published]
+    table["published_area_m2"] = [published_number(study, name, "filter_area_m2", "simulation") for name in names]
     return table
 
 
@@ -64,11 +61,16 @@ def drum_of(study: Study) -> DrumFilter:
     """
     if study.filter is None or study.crystallizer is None:
         raise FilterError("the study has no filter: add the sections crystallizer and filter")
+    return drum_filter(study.filter, study.crystallizer.slurry_concentration_kg_m3)
+
+
+def drum_filter(settings: Filter, slurry_concentration: float) -> DrumFilter:
+    """Return a drum filter for a slurry with so many kg of crystals per m3, in SI."""
     return DrumFilter(
-        pressure_drop=study.filter.pressure_drop_kPa * KILOPASCAL,
-        submerged_fraction=study.filter.submerged_fraction,
-        rotation_rate=study.filter.rotation_rate_rpm / MINUTE,
-        medium_resistance=study.filter.medium_resistance_1_m,
-        viscosity=study.filter.viscosity_mPa_s * MILLIPASCAL_SECOND,
-        slurry_concentration=study.crystallizer.slurry_concentration_kg_m3,
+        pressure_drop=settings.pressure_drop_kPa * KILOPASCAL,
+        submerged_fraction=settings.submerged_fraction,
+        rotation_rate=settings.rotation_rate_rpm / MINUTE,
+        medium_resistance=settings.medium_resistance_1_m,
+        viscosity=settings.viscosity_mPa_s * MILLIPASCAL_SECOND,
+        slurry_concentration=slurry_concentration,
     )

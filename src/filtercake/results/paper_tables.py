@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from filtercake.crystals.crystallizer import SteadyState
-from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated
+from filtercake.crystals.csd import FullAndTruncated, kept_volume
 from filtercake.errors import CrystallizerError
 from filtercake.filtration.resistance import kozeny_carman
 from filtercake.packing.cloud import box_length
 from filtercake.study.config.published import Published
 from filtercake.study.config.study import Study
-from filtercake.study.points import base_rows, bed_of
+from filtercake.study.points import base_rows
+from filtercake.study.scenes import bed_of
 from filtercake.units import HOUR, LITRE, MICROMETRE, MINUTE, tidy
 
 Csds = dict[str, FullAndTruncated]
@@ -55,6 +55,12 @@ def published_value(study: Study, csd: str, quantity: str, kind: str) -> Publish
     return next(found, None)
 
 
+def published_number(study: Study, csd: str, quantity: str, kind: str) -> float:
+    """Value of :func:`published_value`, nan where there is none."""
+    found = published_value(study, csd, quantity, kind)
+    return float("nan") if found is None else found.value
+
+
 def table1(study: Study, csds: Csds) -> pd.DataFrame:
     """Tabulate the system dimension L of every distribution (paper, Table 1).
 
@@ -76,7 +82,7 @@ def table1(study: Study, csds: Csds) -> pd.DataFrame:
                 "particles": bed.particles,
                 "initial_void_fraction": study.packing.initial_void_fraction,
                 "system_dimension_um": round(length, 2),
-                "published_um": _value(published),
+                "published_um": published_number(study, name, "system_dimension_um", "simulation"),
                 "published_particles": particles if published else None,
                 "system_dimension_at_published_um": round(same, 2) if published else None,
             }
@@ -88,7 +94,7 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
     """Tabulate what each distribution keeps when classes are left out of the packing (paper, Table 2)."""
     rows = []
     for name, (full, truncated) in csds.items():
-        kept = np.isin(full.size, truncated.size)
+        kept = kept_volume(full, truncated)
         rows.append(
             {
                 "csd": name,
@@ -100,10 +106,10 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
                 "classes": truncated.size.size,
                 "smallest_um": round(truncated.smallest / MICROMETRE, 2),
                 "largest_um": round(truncated.largest / MICROMETRE, 2),
-                "kept_volume_fraction": _kept(full, truncated),
-                "discarded_volume_fraction": round(float(full.volume_fraction[~kept].sum()), 5),
-                "published_smallest_um": _value(published_value(study, name, "smallest_um", "simulation")),
-                "published_largest_um": _value(published_value(study, name, "largest_um", "simulation")),
+                "kept_volume_fraction": round(kept, 5),
+                "discarded_volume_fraction": round(max(1.0 - kept, 0.0), 5),
+                "published_smallest_um": published_number(study, name, "smallest_um", "simulation"),
+                "published_largest_um": published_number(study, name, "largest_um", "simulation"),
             }
         )
     return pd.DataFrame(rows)
@@ -112,19 +118,8 @@ def table2(study: Study, csds: Csds) -> pd.DataFrame:
 def crystallizer_table(study: Study, states: Mapping[str, SteadyState], csds: Csds) -> pd.DataFrame:
     """Tabulate the crystallizer at every residence time, shortest first (paper, Figs 12 and 13).
 
-    Parameters
-    ----------
-    study : Study
-        Has the slurry flow that makes a volume of a residence time.
-    states : mapping of str to SteadyState
-        The crystallizer behind each of its products.
-    csds : dict of str to (CrystalSizeDistribution, CrystalSizeDistribution)
-        All distributions, full and truncated.
-
-    Returns
-    -------
-    DataFrame
-        :data:`CRYSTALLIZER_COLUMNS`; the mean size is weighted by mass.
+    ``states`` holds the crystallizer behind each of its products. The columns are :data:`CRYSTALLIZER_COLUMNS`; the
+    mean size is weighted by mass.
 
     Raises
     ------
@@ -145,15 +140,11 @@ def crystallizer_table(study: Study, states: Mapping[str, SteadyState], csds: Cs
             "nucleation_rate_1_L_s": state.nucleation_rate * LITRE,
             "size_scale_um": state.size_scale / MICROMETRE,
             "mass_mean_size_um": state.volume_mean / MICROMETRE,
-            "kept_volume_fraction": _kept(*csds[name]),
+            "kept_volume_fraction": round(kept_volume(*csds[name]), 5),
         }
         for name, state in sorted(states.items(), key=lambda item: item[1].residence_time)
     ]
     return pd.DataFrame(rows, columns=list(CRYSTALLIZER_COLUMNS))
-
-
-def _kept(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> float:
-    return round(float(full.volume_fraction[np.isin(full.size, truncated.size)].sum()), 5)
 
 
 def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
@@ -164,10 +155,10 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for name, (full, _) in csds.items():
-        point = _base_point(study, name, summary)
-        if point is None:
+        base = base_rows(study, summary[summary["csd"] == name])
+        if base.empty:
             continue
-        material = study.material
+        point, material = base.iloc[0], study.material
         paper_count = float(point["porosity_paper_count"])
         rows.append(
             {
@@ -176,14 +167,14 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
                 "n": int(point["n"]),
                 "n_failed": int(point["n_failed"]),
                 "engine": point["engine"],
-                "porosity_measured": _value(published_value(study, name, "porosity", "measurement")),
-                "porosity_published": _value(published_value(study, name, "porosity", "simulation")),
+                "porosity_measured": published_number(study, name, "porosity", "measurement"),
+                "porosity_published": published_number(study, name, "porosity", "simulation"),
                 "porosity_paper_count": paper_count,
                 "porosity_paper_count_ci95": point["porosity_paper_count_ci95"],
                 "porosity": point["porosity"],
                 "porosity_ci95": point["porosity_ci95"],
                 **_measured_resistance(published_value(study, name, "resistance_m_kg", "measurement")),
-                "resistance_published_m_kg": _value(published_value(study, name, "resistance_m_kg", "simulation")),
+                "resistance_published_m_kg": published_number(study, name, "resistance_m_kg", "simulation"),
                 "resistance_paper_count_m_kg": (
                     kozeny_carman(paper_count, full, material.density, material.sphericity)
                     if np.isfinite(paper_count)
@@ -197,12 +188,6 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _base_point(study: Study, csd: str, summary: pd.DataFrame) -> pd.Series[Any] | None:
-    """Row of a distribution at the study's base material, None where no sweep visits it."""
-    found = base_rows(study, summary[summary["csd"] == csd])
-    return None if found.empty else found.iloc[0]
-
-
 def _measured_resistance(published: Published | None) -> dict[str, float]:
     """Return a measured resistance, or the range where only that is known."""
     names = ("resistance_measured_m_kg", "resistance_measured_low_m_kg", "resistance_measured_high_m_kg")
@@ -213,12 +198,8 @@ def _measured_resistance(published: Published | None) -> dict[str, float]:
     return dict(zip(names, (np.nan, published.low, published.high), strict=True))
 
 
-def _value(published: Published | None) -> float:
-    return float("nan") if published is None else published.value
-
-
 def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
-    """Set every published porosity simulated at a visited point beside ours by the same estimator.
+    """Compare published simulated porosities at visited points with ours by the same estimator.
 
     ``sd`` is the standard deviation of one packing, pooled over the study's points of the same engine: a few
     replicates of one point say little about it. ``deviation_sd`` is the published value's distance from our mean

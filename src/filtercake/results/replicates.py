@@ -1,8 +1,8 @@
-"""What came out of a study: one row per packing, then one per point with means and intervals."""
+"""Results of a study: one row per packing, then one per point with means and intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,19 +68,10 @@ SUMMARY_COLUMNS = (
 def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, sphericity: float) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
-    Parameters
-    ----------
-    point : Point
-        Where it belongs.
-    packing : Packing
-        The packing.
-    csd : (CrystalSizeDistribution, CrystalSizeDistribution)
-        The full distribution, which the resistance needs all of, and the truncated one, for comparison.
-    sphericity : float
-        For the resistance law.
+    The resistance is that of the full distribution; that of the truncated one is kept for comparison.
     """
-    found, record = measure(packing, point.spec), packing.diagnostics
-    (full, truncated), law = csd, (point.spec.density, sphericity)
+    found, record = measure(packing, point.scene), packing.diagnostics
+    (full, truncated), law = csd, (point.scene.density, sphericity)
     return {
         **point.row(),
         "replicate": record["replicate"],
@@ -105,42 +96,35 @@ def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, spheric
     }
 
 
-def failed_row(point: Point, outcome: Outcome, reason: str) -> dict[str, Any]:
-    """Row of a replicate without an accepted packing: a status and a reason, everything else blank."""
-    who = {"replicate": outcome.replicate, "seed": outcome.seed}
-    return {**point.row(), **who, "status": "failed", "reason": reason, "settled": False}
+def replicate_rows(
+    point: Point, outcomes: Iterable[Outcome], folder: Path, csd: FullAndTruncated, sphericity: float
+) -> Iterator[dict[str, Any]]:
+    """Measure a point's packings in its folder; a failed or damaged one is a row with a reason, blank but for that."""
+    for outcome in outcomes:
+        reason = outcome.reason
+        if outcome.status == "ok":
+            try:
+                packing = Packing.load(folder / f"r{outcome.replicate}.npz")
+                yield replicate_row(point, packing, csd, sphericity)
+                continue
+            except PackingRejected as error:
+                reason = str(error)
+        who = {"replicate": outcome.replicate, "seed": outcome.seed}
+        yield {**point.row(), **who, "status": "failed", "reason": reason, "settled": False}
 
 
 def replicates_table(
     points: Iterable[Point], packings: Path, csds: Mapping[str, FullAndTruncated], sphericity: float
 ) -> pd.DataFrame:
-    """Measure every packing of a study, ``REPLICATE_COLUMNS``; a failed or damaged one is a row with a reason.
+    """Measure every packing of a study, ``REPLICATE_COLUMNS``.
 
-    Parameters
-    ----------
-    points : iterable of Point
-        The study's points.
-    packings : Path
-        Folder with one folder per point.
-    csds : mapping of str to (CrystalSizeDistribution, CrystalSizeDistribution)
-        The full and truncated distributions by name.
-    sphericity : float
-        For the resistance law.
+    ``packings`` holds one folder per point; ``sphericity`` is for the resistance law.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for point in points:
         folder = packings / point.name
-        for entry in read_record(folder / MANIFEST)["replicates"]:
-            outcome = Outcome(**entry)
-            if outcome.status != "ok":
-                rows.append(failed_row(point, outcome, outcome.reason))
-                continue
-            try:
-                packing = Packing.load(folder / f"r{outcome.replicate}.npz")
-            except PackingRejected as error:
-                rows.append(failed_row(point, outcome, str(error)))
-                continue
-            rows.append(replicate_row(point, packing, csds[point.csd], sphericity))
+        outcomes = [Outcome(**entry) for entry in read_record(folder / MANIFEST)["replicates"]]
+        rows += replicate_rows(point, outcomes, folder, csds[point.csd], sphericity)
     return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
 
 
@@ -166,7 +150,7 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
 
 
 def _reached(half: float, asked: float) -> str:
-    """Say whether an interval is as narrow as asked; nothing where none was asked for."""
+    """Whether an interval is as narrow as its target ("yes", "no"); empty without a target."""
     if np.isnan(asked):
         return ""
     return "yes" if half <= asked else "no"

@@ -20,14 +20,9 @@ class ChecksumsDamaged(FiltercakeError):  # noqa: N818 - reads better where it i
 
 
 def write(checksums: Path, outputs: Iterable[str | Path]) -> None:
-    """Note the SHA-256 of a job's outputs; names are relative to the file, so that the results may be moved.
+    """Note the SHA-256 of a job's outputs in a file that ``sha256sum -c`` in its folder checks.
 
-    Parameters
-    ----------
-    checksums : Path
-        The file to write; ``sha256sum -c`` in its folder checks it.
-    outputs : iterable of str or Path
-        What the job made.
+    Names are relative to the file, so that the results may be moved.
     """
     lines = [f"{sha256(Path(output))}  {os.path.relpath(output, checksums.parent)}\n" for output in outputs]
     text = "".join(lines)

@@ -1,4 +1,4 @@
-"""What a run says at its start and at its end: the plan, where the results are, and why something failed."""
+"""Messages at the start and the end of a run: plan, places of the results, reasons of failures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Points = Mapping[str, Mapping[str, Point]]
 
 
 def worth_reading(record: logging.LogRecord) -> bool:
-    """Whether a line of Snakemake's says more than that it goes on; warnings and errors always do."""
+    """Whether a line of Snakemake's is no routine message; warnings and errors never are."""
     return record.levelno > logging.INFO or not record.getMessage().startswith(CHATTER)
 
 
@@ -38,7 +38,7 @@ def plan(points: Points, missing: Mapping[str, Mapping[str, int]]) -> str:
     missing : mapping
         Packings to make, by study and name of the points that are to be made or completed.
     """
-    engines = sorted({points[study][name].spec.engine for study, group in missing.items() for name in group})
+    engines = sorted({points[study][name].scene.engine for study, group in missing.items() for name in group})
     total = sum(len(group) for group in points.values())
     making = sum(len(group) for group in missing.values())
     packings = sum(sum(group.values()) for group in missing.values())
@@ -89,7 +89,7 @@ def _answer(file: Path) -> Iterator[str]:
 
 
 def _wide_intervals(summary: Path) -> Iterator[str]:
-    """Say of each point whose porosity is not known as well as asked how well it is known."""
+    """Points whose porosity interval is wider than its target, in words."""
     if not summary.exists():
         return
     table = pd.read_csv(summary)
@@ -101,18 +101,9 @@ def _wide_intervals(summary: Path) -> Iterator[str]:
 
 
 def failure(results: Path, points: Points, since: float, cluster_logs: Path | None = None) -> str:
-    """Name the jobs that failed, their reasons and logs, and the command that resumes.
+    """Name the jobs that failed since the run's start (s since the epoch), their reasons and logs, and how to resume.
 
-    Parameters
-    ----------
-    results : Path
-        Folder of the results.
-    points : mapping
-        Points by study and name.
-    since : float
-        When the run started, s since the epoch: older logs speak of older runs.
-    cluster_logs : Path, optional
-        Folder of a cluster's own logs; it keeps those of submissions that failed.
+    A cluster keeps logs of its own, in ``cluster_logs``; among them are those of submissions that failed.
     """
     lines = []
     for study in points:

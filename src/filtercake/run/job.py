@@ -1,4 +1,4 @@
-"""What every job of a workflow needs: a log, an orderly end, and a word about progress."""
+"""Frame of every job of a workflow: log, orderly end, progress."""
 
 from __future__ import annotations
 
@@ -27,19 +27,9 @@ FOLDER_VARIABLE = "FILTERCAKE_FOLDER"
 
 @contextmanager
 def job(log: str | Path, outputs: Iterable[str | Path] = ()) -> Iterator[logging.Logger]:
-    """Run a job's body: log to a file, turn SIGTERM into an orderly end, and say a failure's reason in one line.
+    """Run a job's body and yield its logger: SIGTERM is an orderly end, a failure's reason is one line.
 
-    Parameters
-    ----------
-    log : str or Path
-        The job's log file.
-    outputs : iterable of str or Path
-        What the job makes; their checksums are kept beside the log.
-
-    Yields
-    ------
-    Logger
-        For the job's own words.
+    The checksums of the job's ``outputs`` are kept beside its log.
     """
     path = Path(log)
     path.parent.mkdir(parents=True, exist_ok=True)

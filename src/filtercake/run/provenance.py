@@ -1,9 +1,10 @@
-"""Where results come from: the library files behind a module, and the versions behind a run."""
+"""Provenance of results: the library files behind a module, and the versions behind a run."""
 
 from __future__ import annotations
 
 import ast
 import importlib.metadata
+import inspect
 import platform
 import subprocess
 from collections.abc import Iterable
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from filtercake import __version__
+from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.liggghts import template_folder
 from filtercake.packing.result import sha256
 from filtercake.packing.scene import digest
@@ -22,15 +24,10 @@ PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "scikit-learn", "
 
 @cache
 def sources(module: str) -> tuple[Path, ...]:
-    """List the library's own files that a module depends on, itself included, sorted.
+    """List the library's own files that a module (``packing.pack``) depends on, itself included, sorted.
 
     Snakemake does not see imports: rules take the :func:`code_hash` of these files as a parameter, so that an edit
     reruns what depends on it.
-
-    Parameters
-    ----------
-    module : str
-        Dotted name below ``filtercake``, e.g. ``packing.pack``.
 
     Raises
     ------
@@ -52,12 +49,12 @@ def packing_sources(engine: str) -> tuple[Path, ...]:
     FileNotFoundError
         If there is no such engine.
     """
-    registry, start = _file_of("packing.engines"), _file_of(f"packing.engines.{engine}")
-    if registry is None or start is None:
+    if engine not in ENGINES:
         raise FileNotFoundError(f"filtercake has no engine {engine!r}")
-    own = _closure(start, closed=registry)
+    registry = ROOT / "packing" / "engines" / "__init__.py"
+    own = _closure(Path(inspect.getfile(ENGINES[engine])), closed=registry)
     others = set(registry.parent.glob("*.py")) - own
-    return tuple(path for path in sources("packing.pack") if path not in others)
+    return tuple(sorted(own | set(sources("packing.pack")) - others))
 
 
 def _closure(start: Path, closed: Path | None = None) -> set[Path]:

@@ -39,14 +39,7 @@ class RunGoesOn(FiltercakeError):  # noqa: N818 - reads better where it is raise
 
 
 def prepare(folder: Path, results: Path) -> Iterator[str]:
-    """Make a folder fit to run in again, whatever stopped the last run.
-
-    Parameters
-    ----------
-    folder : Path
-        Working directory of the workflow.
-    results : Path
-        Folder of the results.
+    """Make the working directory of a workflow fit to run in again, whatever stopped the last run.
 
     Yields
     ------

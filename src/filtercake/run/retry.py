@@ -11,23 +11,13 @@ from filtercake.packing.pack import MANIFEST
 from filtercake.run import checksums
 
 LAST = ("provenance.json", "replicates.csv", "calibration.json")
-"""What stands at the end of a study or calibration; while it stands, Snakemake looks for nothing behind it."""
+"""Last files of a study or calibration; while one exists, Snakemake looks for nothing behind it."""
 
 
 def forget_failures(results: Path, *, may_pass: bool = False) -> list[str]:
-    """Forget the points that hold a failed packing; accepted packings stay and are not made again.
+    """Forget the points that hold a failed packing, and list them; accepted packings stay and are not made again.
 
-    Parameters
-    ----------
-    results : Path
-        Folder of the results.
-    may_pass : bool
-        Only those that failed for a reason outside the packing.
-
-    Returns
-    -------
-    list of str
-        The points that were forgotten.
+    With ``may_pass``, only those that failed for a reason outside the packing.
     """
     forgotten = []
     for manifest in sorted(results.glob(f"*/packings/*/{MANIFEST}")):
@@ -47,12 +37,9 @@ def _counts(entry: dict[str, Any], may_pass: bool) -> bool:
 
 
 def forget(path: Path) -> None:
-    """Remove a file of the results with what may have been made from it: tables and figures, never a packing.
+    """Remove a file below ``<results>/<study>`` with the tables and figures made from it, never a packing.
 
-    Parameters
-    ----------
-    path : Path
-        File below ``<results>/<study>``. In a folder without packings, nothing else is removed.
+    In a folder without packings, nothing else is removed.
     """
     path.unlink(missing_ok=True)
     study = next((parent for parent in path.parents if (parent / "packings").is_dir()), None)

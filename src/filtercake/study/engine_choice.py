@@ -1,30 +1,19 @@
-"""Which engine a study uses on this machine."""
+"""Choice of the engine for ``engine: auto`` on this machine."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import ConfigError, Problem
-from filtercake.packing.cloud import NARROW
 from filtercake.packing.engines import ENGINES
-from filtercake.study.limits import LIGGGHTS_RESTITUTION
+from filtercake.packing.scene import Scene
+from filtercake.study.config.packing import AUTO
 from filtercake.study.loading import LoadedStudy
 
-SMALL_BED = 10_000
-"""Spheres up to which LIGGGHTS is taken whatever the width of the distribution."""
 
-
-def choose(csd: CrystalSizeDistribution, particles: int, restitution: float) -> str:
-    """Name the engine for ``engine: auto``.
-
-    LIGGGHTS where it is installed, takes the restitution, and the bed is small or narrow; the embedded engine
-    everywhere else: LIGGGHTS lists neighbours on one grid, which a wide distribution fills with pairs that never
-    touch.
-    """
-    fast = particles <= SMALL_BED or csd.largest <= NARROW * csd.smallest
-    suits = fast and restitution > LIGGGHTS_RESTITUTION
-    return "liggghts" if suits and ENGINES["liggghts"]().why_missing() is None else "embedded"
+def choose(scene: Scene) -> str:
+    """Name the engine for ``engine: auto``: the first that suits the scene and runs here."""
+    return next(name for name, kind in ENGINES.items() if kind.suits(scene) and kind().why_missing() is None)
 
 
 def check(studies: Iterable[LoadedStudy]) -> None:
@@ -38,7 +27,7 @@ def check(studies: Iterable[LoadedStudy]) -> None:
     problems = []
     for study in studies:
         asked = study.model.packing.engine
-        reason = ENGINES[asked]().why_missing() if asked != "auto" else None
+        reason = ENGINES[asked]().why_missing() if asked != AUTO else None
         if reason is not None:
             allowed = f"an engine that runs on this machine (auto takes one); {reason}"
             problems.append(Problem(str(study.path), "packing.engine", asked, allowed))

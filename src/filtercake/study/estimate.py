@@ -8,16 +8,14 @@ free-fall times such a bed needs to come to rest.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.packing.cloud import NARROW, PLACEMENT_HEIGHT, box_length
+from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.base import parallelism
-from filtercake.packing.engines.liggghts_as_published import STEPS
 from filtercake.packing.replication import LEAST_REPLICATES
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.study.points import Point
 from filtercake.units import HOUR, MINUTE, duration
 
@@ -34,20 +32,10 @@ FALLS: Final = {
 WIDE_FALLS: Final = 1.15
 """Factor on it for a wide distribution, whose bed swings for longer."""
 
-SPHERE_STEP: Final = {
-    ("embedded", False): 21e-9,
-    ("embedded", True): 38e-9,
-    ("liggghts", False): 132e-9,
-    ("liggghts", True): 155e-9,
-    ("liggghts_as_published", False): 700e-9,
-    ("liggghts_as_published", True): 700e-9,
-}
-"""Seconds per sphere and step at ``SPHERES``, by engine and friction."""
 SPHERES: Final = 8000
+"""Number of spheres that the engines' times per sphere and step are for."""
 GROWTH: Final = 0.1
 """Exponent of the time per sphere in the number of spheres: less of a large bed is surface, and it needs more steps."""
-WIDE_LIGGGHTS: Final = 1.8
-"""Factor on it for LIGGGHTS and a wide distribution, which fills its one neighbour grid with pairs that never touch."""
 START_SECONDS: Final = 5.0
 """Seconds of a job before and after its packings: Python, compiled kernels from their cache, records."""
 SPREAD: Final = 0.0026
@@ -83,8 +71,6 @@ SUBMISSION_MINUTES: Final = 10.0
 """Estimated time that makes one submission worth its wait in a cluster's queue."""
 GROUP_SIZES: Final = (32, 8)
 """Points in one submission, one after the other; the largest that stays within ``SUBMISSION_MINUTES`` is taken."""
-
-Csds = Mapping[str, CrystalSizeDistribution]
 
 
 @dataclass(frozen=True)
@@ -122,103 +108,89 @@ class Estimate:
         )
 
 
-def fall_steps(spec: PackingSpec, csd: CrystalSizeDistribution) -> float:
-    """Return the time steps that a packing of a (truncated) distribution is expected to take."""
-    if spec.engine == "liggghts_as_published":
-        return STEPS
-    length = box_length(csd, spec.particles, spec.initial_void_fraction, spec.bed_depth_factor)
-    fall = spec.free_fall_time(PLACEMENT_HEIGHT * spec.bed_depth_factor * length)
-    falls = FALLS[spec.friction > 0.0, spec.cohesion > 0.0] * (WIDE_FALLS if _wide(csd) else 1.0)
-    return float(min(falls, spec.max_fall_times) * fall / spec.time_step)
+def fall_steps(scene: Scene) -> float:
+    """Return the time steps that a packing is expected to take."""
+    steps = ENGINES[scene.engine].fixed_steps
+    if steps:
+        return steps
+    falls = FALLS[scene.friction > 0.0, scene.cohesion > 0.0] * (WIDE_FALLS if scene.is_wide else 1.0)
+    return float(min(falls, scene.max_fall_times) * scene.free_fall_time(scene.cloud_height) / scene.time_step)
 
 
-def packing_seconds(spec: PackingSpec, csd: CrystalSizeDistribution) -> float:
-    """Time of one packing on one core, s.
-
-    Parameters
-    ----------
-    spec : PackingSpec
-        What is packed.
-    csd : CrystalSizeDistribution
-        The (truncated) distribution.
-    """
-    seconds = SPHERE_STEP[spec.engine, spec.friction > 0.0] * spec.particles * fall_steps(spec, csd)
-    if spec.engine == "liggghts_as_published":
+def packing_seconds(scene: Scene) -> float:
+    """Time of one packing on one core, s."""
+    engine = ENGINES[scene.engine]
+    seconds = engine.sphere_step[scene.friction > 0.0] * scene.particles * fall_steps(scene)
+    if engine.fixed_steps:
         return seconds
-    if spec.engine == "liggghts" and _wide(csd):
-        seconds *= WIDE_LIGGGHTS
-    return seconds * float((spec.particles / SPHERES) ** GROWTH)
+    return seconds * (engine.wide_factor if scene.is_wide else 1.0) * float((scene.particles / SPHERES) ** GROWTH)
 
 
 def packings_of(point: Point) -> int:
     """Return the packings that a point is expected to need: those asked for, or those that its interval takes."""
     if point.porosity_ci95_target is None:
         return point.replicates
-    spread = SPREAD * math.sqrt(SPREAD_PARTICLES / point.spec.particles)
+    spread = SPREAD * math.sqrt(SPREAD_PARTICLES / point.scene.particles)
     needed = math.ceil((QUANTILE * spread / point.porosity_ci95_target) ** 2)
     return min(max(needed, LEAST_REPLICATES, point.replicates), point.most_replicates)
 
 
-def job_seconds(point: Point, csd: CrystalSizeDistribution, start: float = START_SECONDS) -> float:
+def job_seconds(point: Point, start: float = START_SECONDS) -> float:
     """Return the wall time of a point's job on the cores it takes, s; ``start`` is its time beside packing."""
     # ASSUME: two processes or threads halve the time of a large bed
-    return start + packings_of(point) * packing_seconds(point.spec, csd) / parallelism(point.spec)
+    return start + packings_of(point) * packing_seconds(point.scene) / parallelism(point.scene)
 
 
-def walltime_minutes(
-    point: Point, csd: CrystalSizeDistribution, attempt: int = 1, *, granted: int = LONGEST_MINUTES
-) -> int:
+def walltime_minutes(point: Point, attempt: int = 1, *, granted: int = LONGEST_MINUTES) -> int:
     """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry.
 
     A submission, in which other points may wait for this one, asks for no more than is ``granted`` (min).
     """
-    longest = granted // group_size(point, csd, granted=granted)
-    return min(_first_walltime(point, csd) << (attempt - 1), longest)
+    longest = granted // group_size(point, granted=granted)
+    return min(_first_walltime(point) << (attempt - 1), longest)
 
 
-def _first_walltime(point: Point, csd: CrystalSizeDistribution) -> int:
-    most = point.most_replicates * packing_seconds(point.spec, csd) / parallelism(point.spec)
+def _first_walltime(point: Point) -> int:
+    most = point.most_replicates * packing_seconds(point.scene) / parallelism(point.scene)
     return math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
 
 
-def memory_mb(spec: PackingSpec) -> int:
+def memory_mb(scene: Scene) -> int:
     """Memory to ask for, MB: measured, with room."""
-    return math.ceil(BASE_MB + SPHERE_MB * spec.particles)
+    return math.ceil(BASE_MB + SPHERE_MB * scene.particles)
 
 
-def group_size(point: Point, csd: CrystalSizeDistribution, *, granted: int = LONGEST_MINUTES) -> int:
+def group_size(point: Point, *, granted: int = LONGEST_MINUTES) -> int:
     """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one.
 
     The walltimes of all of them together stay within what is ``granted`` (min).
     """
-    if parallelism(point.spec) > 1:
+    if parallelism(point.scene) > 1:
         return 1
-    minutes = job_seconds(point, csd, START_SECONDS + NODE_SECONDS) / MINUTE
-    walltime = _first_walltime(point, csd)
+    minutes = job_seconds(point, START_SECONDS + NODE_SECONDS) / MINUTE
+    walltime = _first_walltime(point)
     fitting = (size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES and size * walltime <= granted)
     return next(fitting, 1)
 
 
-def estimate(points: Iterable[Point], csds: Csds, *, on_cluster: bool = False) -> Estimate:
+def estimate(points: Iterable[Point], *, on_cluster: bool = False) -> Estimate:
     """Estimate what a study's points will cost.
 
     Parameters
     ----------
     points : iterable of Point
         Those to be made.
-    csds : mapping of str to CrystalSizeDistribution
-        The (truncated) distributions by name.
     on_cluster : bool
         Whether Snakemake is started on a node for each.
     """
     start = START_SECONDS + (NODE_SECONDS if on_cluster else 0.0)
-    listed = [(point, csds[point.csd]) for point in points]
-    packings = [packings_of(point) for point, _ in listed]
-    bytes_each = [SPHERE_BYTES * point.spec.particles + PACKING_BYTES for point, _ in listed]
+    listed = list(points)
+    packings = [packings_of(point) for point in listed]
+    bytes_each = [SPHERE_BYTES * point.scene.particles + PACKING_BYTES for point in listed]
     written = sum(n * size for n, size in zip(packings, bytes_each, strict=True))
     return Estimate(
-        core_seconds=sum(job_seconds(point, csd, start) * parallelism(point.spec) for point, csd in listed),
-        longest=max((job_seconds(point, csd, start) for point, csd in listed), default=0.0),
+        core_seconds=sum(job_seconds(point, start) * parallelism(point.scene) for point in listed),
+        longest=max((job_seconds(point, start) for point in listed), default=0.0),
         disk=written + POINT_BYTES * len(listed) + (STUDY_BYTES if listed else 0),
         points=len(listed),
         packings=sum(packings),
@@ -235,10 +207,6 @@ def together(estimates: Iterable[Estimate]) -> Estimate:
         points=sum(item.points for item in listed),
         packings=sum(item.packings for item in listed),
     )
-
-
-def _wide(csd: CrystalSizeDistribution) -> bool:
-    return csd.largest > NARROW * csd.smallest
 
 
 def _amount(hours: float) -> str:

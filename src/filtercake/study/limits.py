@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from filtercake.packing import contact_law
+from filtercake.packing.engines import kind_of
+from filtercake.packing.scene import Scene
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROSECOND
 
 PAGE: Final = "docs/stability.md"
@@ -28,8 +30,6 @@ LARGEST_TIME_STEP: Final = 1.0
 """Time step over the Rayleigh step from which beds explode: refused."""
 SMALL_RESTITUTION, DAMPED_TIME_STEP = 0.1, 0.5
 """Restitution under which contacts are damped so hard that a longer step gives wrong porosities: refused."""
-LIGGGHTS_RESTITUTION: Final = 0.05
-"""LIGGGHTS takes no restitution of this or less: refused with that engine."""
 LARGE_RESTITUTION: Final = 0.95
 """Restitution above which beds hardly come to rest: warned."""
 FRICTIONAL_LIMIT: Final = 0.36
@@ -40,45 +40,6 @@ LARGEST_RELATIVE_OVERLAP: Final = 0.035
 """Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
 DOUBTFUL_RELATIVE_OVERLAP: Final = 0.01
 """Contacts overlap by more than this share of the diameter: warned."""
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """What decides whether a scene is safe to settle.
-
-    Attributes
-    ----------
-    smallest : float
-        Smallest diameter, m.
-    density, youngs_modulus, poisson_ratio, restitution, friction, cohesion : float
-        The material, SI.
-    time_step : float
-        Time step, s.
-    engine : str
-        The engine asked for.
-    """
-
-    smallest: float
-    density: float
-    youngs_modulus: float
-    poisson_ratio: float
-    restitution: float
-    friction: float
-    cohesion: float
-    time_step: float
-    engine: str = "auto"
-
-    @property
-    def rayleigh(self) -> float:
-        """Rayleigh time step of the smallest sphere, s."""
-        return contact_law.rayleigh_time_step(
-            0.5 * self.smallest, self.density, self.youngs_modulus, self.poisson_ratio
-        )
-
-    @property
-    def overlap(self) -> float:
-        """Equilibrium overlap of equal spheres over their diameter."""
-        return contact_law.relative_overlap(self.cohesion, self.youngs_modulus, self.poisson_ratio)
 
 
 @dataclass(frozen=True)
@@ -102,9 +63,10 @@ def default_time_step(friction: float) -> float:
     return FRICTIONAL_TIME_STEP if friction > 0.0 else FRICTIONLESS_TIME_STEP
 
 
-def refusals(scene: Numbers) -> Iterator[Finding]:
+def refusals(scene: Scene) -> Iterator[Finding]:
     """Say what is proven unstable about a scene."""
-    if scene.overlap > LARGEST_RELATIVE_OVERLAP:
+    rayleigh = scene.rayleigh_time_step
+    if scene.relative_overlap > LARGEST_RELATIVE_OVERLAP:
         limit = contact_law.cohesion_at_overlap(LARGEST_RELATIVE_OVERLAP, scene.youngs_modulus, scene.poisson_ratio)
         yield Finding(
             "cohesion",
@@ -114,28 +76,29 @@ def refusals(scene: Numbers) -> Iterator[Finding]:
         )
     if scene.density > LARGEST_DENSITY:
         yield Finding("density", f"must be at most {LARGEST_DENSITY:g} kg/m3 ({PAGE})")
-    if scene.time_step >= LARGEST_TIME_STEP * scene.rayleigh:
+    if scene.time_step >= LARGEST_TIME_STEP * rayleigh:
         yield Finding(
             "time_step",
-            f"must be below the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us ({PAGE}); leave it out for "
+            f"must be below the Rayleigh time step {rayleigh / MICROSECOND:.4g} us ({PAGE}); leave it out for "
             f"{FRICTIONLESS_TIME_STEP:g} of that (without friction) or {FRICTIONAL_TIME_STEP:g} (with)",
         )
-    elif scene.time_step < SMALLEST_TIME_STEP * (1.0 - 1e-9) * scene.rayleigh:
+    elif scene.time_step < SMALLEST_TIME_STEP * (1.0 - 1e-9) * rayleigh:
         yield Finding(
             "time_step",
-            f"must be at least {SMALLEST_TIME_STEP:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us: "
+            f"must be at least {SMALLEST_TIME_STEP:g} of the Rayleigh time step {rayleigh / MICROSECOND:.4g} us: "
             "shorter ones change nothing but the run time",
         )
     else:
         yield from _long_steps(scene)
-    if scene.engine.startswith("liggghts") and scene.restitution <= LIGGGHTS_RESTITUTION:
-        yield Finding(
-            "restitution", f"LIGGGHTS takes only more than {LIGGGHTS_RESTITUTION:g}; use engine: embedded ({PAGE})"
-        )
+    engine = kind_of(scene.engine)
+    if scene.restitution <= engine.least_restitution:
+        text = f"{engine.label} takes only more than {engine.least_restitution:g}; use engine: auto ({PAGE})"
+        yield Finding("restitution", text)
 
 
-def _long_steps(scene: Numbers) -> Iterator[Finding]:
+def _long_steps(scene: Scene) -> Iterator[Finding]:
     """Say which time steps under the Rayleigh step are still too long for a scene."""
+    rayleigh, overlap = scene.rayleigh_time_step, scene.relative_overlap
     limits = (
         (
             scene.restitution < SMALL_RESTITUTION,
@@ -143,28 +106,28 @@ def _long_steps(scene: Numbers) -> Iterator[Finding]:
             f"at a restitution under {SMALL_RESTITUTION:g}: above it, porosities look right but are off by 0.01",
         ),
         (
-            scene.overlap > DOUBTFUL_RELATIVE_OVERLAP,
+            overlap > DOUBTFUL_RELATIVE_OVERLAP,
             SOFT_TIME_STEP,
-            f"where contacts overlap by {scene.overlap:.1%} of the diameter: above it, beds do not come to rest",
+            f"where contacts overlap by {overlap:.1%} of the diameter: above it, beds do not come to rest",
         ),
         (scene.friction > 0.0, FRICTIONAL_LIMIT, "with friction: above it, beds do not come to rest"),
     )
     for holds, limit, why in limits:
-        if holds and scene.time_step > (limit + 1e-9) * scene.rayleigh:
+        if holds and scene.time_step > (limit + 1e-9) * rayleigh:
             yield Finding(
                 "time_step",
-                f"must be at most {limit:g} of the Rayleigh time step {scene.rayleigh / MICROSECOND:.4g} us {why} "
-                f"({PAGE})",
+                f"must be at most {limit:g} of the Rayleigh time step {rayleigh / MICROSECOND:.4g} us {why} ({PAGE})",
             )
 
 
-def doubts(scene: Numbers) -> Iterator[Finding]:
+def doubts(scene: Scene) -> Iterator[Finding]:
     """Say what is allowed about a scene, but makes its porosity depend on a choice of numbers."""
-    if DOUBTFUL_RELATIVE_OVERLAP < scene.overlap <= LARGEST_RELATIVE_OVERLAP:
+    overlap = scene.relative_overlap
+    if DOUBTFUL_RELATIVE_OVERLAP < overlap <= LARGEST_RELATIVE_OVERLAP:
         yield Finding(
             "cohesion",
-            f"contacts overlap by {scene.overlap:.1%} of the diameter, which alone lowers the porosity by about "
-            f"{3 * 0.65 * scene.overlap:.3f} ({PAGE})",
+            f"contacts overlap by {overlap:.1%} of the diameter, which alone lowers the porosity by about "
+            f"{3 * 0.65 * overlap:.3f} ({PAGE})",
         )
     if scene.restitution > LARGE_RESTITUTION:
         yield Finding(
@@ -172,7 +135,7 @@ def doubts(scene: Numbers) -> Iterator[Finding]:
         )
 
 
-def verdict(scene: Numbers) -> str:
+def verdict(scene: Scene) -> str:
     """Return what the configuration says to a scene: ``refused``, ``warned`` or ``allowed``."""
     if any(True for _ in refusals(scene)):
         return "refused"

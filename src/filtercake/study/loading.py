@@ -1,8 +1,7 @@
-"""Read configuration files and say everything that is wrong with them at once: file, key, value, what is allowed."""
+"""Read and check configuration files; every problem is reported at once, with file, key, value and allowed values."""
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
 from collections.abc import Iterable
@@ -14,9 +13,9 @@ from pydantic import BaseModel, ValidationError
 
 from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
-from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, shown
-from filtercake.packing import contact_law
+from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
 from filtercake.packing.cloud import bed_for
+from filtercake.packing.scene import Scene
 from filtercake.study import limits
 from filtercake.study.config.crystals import Crystallizer, Csd
 from filtercake.study.config.packing import Packing
@@ -24,7 +23,8 @@ from filtercake.study.config.study import MOST_DISTRIBUTIONS, Study, Workflow
 from filtercake.study.config.sweep import SWEPT
 from filtercake.study.config.values import MOST_PARTICLES, MOST_POINTS, NAME
 from filtercake.study.products import resolve, slurry_problems
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MINUTE
+from filtercake.study.scenes import scene_of
+from filtercake.units import MICROMETRE, MINUTE
 from filtercake.user_files import is_file, read_yaml
 
 MOST_PROBLEMS = 1000
@@ -44,7 +44,7 @@ OWN_NAMES = ("benchmark", "benchmark_quick", "benchmark_redrawn", "benchmarks", 
 """Folders of the results that are the workflow's own: no study can have such a name."""
 
 OWN_PREFIXES = ("agreement_", "calibration_")
-"""How the names begin of the studies that the workflow makes itself."""
+"""First parts of the names of studies that the workflow makes itself."""
 
 _OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
 
@@ -89,7 +89,7 @@ class LoadedStudy:
     csds : dict of str to LoadedCsd
         Its distributions.
     warnings : tuple of str
-        What is allowed but doubtful.
+        Doubts about allowed values.
     """
 
     name: str
@@ -131,7 +131,7 @@ def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
             problems.append(Problem(file, key, repr(study), "a study's file name must be letters, digits, - and _"))
         elif not is_file(path):
             allowed = f"no such study; allowed: {', '.join(known)}, or the path of a study file"
-            problems.append(Problem(file, key, repr(study), allowed + _did_you_mean(study, known)))
+            problems.append(Problem(file, key, repr(study), allowed + did_you_mean(study, known)))
         elif path.stem in [other.stem for other in paths]:
             problems.append(Problem(file, key, repr(study), "two studies of the same name; rename one file"))
         elif _is_own(path, folder.parent / "benchmarks"):
@@ -162,14 +162,7 @@ def load_study(path: Path) -> LoadedStudy:
 
 
 def check_study(values: Any, path: Path) -> LoadedStudy:
-    """Check a study's values, however they were given.
-
-    Parameters
-    ----------
-    values : Any
-        What the study's file holds.
-    path : Path
-        Its file, for messages and for the files it names.
+    """Check a study's values, however they were given; the path is for messages and for the files they name.
 
     Raises
     ------
@@ -216,16 +209,7 @@ def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
 
 
 def parse(model: type[M], values: Any, file: str) -> M:
-    """Check the values of a YAML file against its model.
-
-    Parameters
-    ----------
-    model : type of BaseModel
-        What the file must be.
-    values : Any
-        What :func:`~filtercake.user_files.read_yaml` returned.
-    file : str
-        Its name, for messages.
+    """Check what :func:`~filtercake.user_files.read_yaml` returned for a file against the model of that file.
 
     Raises
     ------
@@ -249,7 +233,7 @@ def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
     if item["type"] == "extra_forbidden":
         allowed = _allowed_keys(model, location[:-1])
         new = next((name for name in RENAMED.get(str(location[-1]), ()) if name in allowed), None)
-        message = f"unknown key; allowed here: {', '.join(allowed)}{_did_you_mean(str(location[-1]), allowed)}"
+        message = f"unknown key; allowed here: {', '.join(allowed)}{did_you_mean(str(location[-1]), allowed)}"
         if new is not None:
             message = f"is now called {new}"
     elif item["type"] == "missing":
@@ -286,11 +270,6 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
-
-
-def _did_you_mean(word: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"; did you mean {close[0]}?" if close else ""
 
 
 def _source_of(name: str, csd: Csd) -> tuple[str, str]:
@@ -352,45 +331,25 @@ def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
     named += [(f"published[{i}].csd", entry.csd) for i, entry in enumerate(model.published)]
     for key, name in named:
         if name not in model.csds:
-            allowed = f"not in csds; allowed: {', '.join(known)}{_did_you_mean(name, known)}"
+            allowed = f"not in csds; allowed: {', '.join(known)}{did_you_mean(name, known)}"
             yield Problem(file, key, repr(name), allowed)
 
 
-def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str, tuple[str, float]], limits.Numbers]]:
-    """Every scene of a study as the fence sees it, with the keys and values that a finding may be about."""
-    packing, material = model.packing, model.material
+def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str, tuple[str, float]], Scene]]:
+    """Every scene of a study, with the keys and values that a finding of the fence may be about."""
     for index, sweep in enumerate(model.sweeps):
         axes = [_values(model, index, name) for name in SWEPT]
-        for name in sweep.csd or []:
-            if name not in csds:
-                continue
-            smallest = csds[name].truncated.smallest
-            for places in itertools.product(*axes):
-                where = dict(zip(SWEPT, places, strict=True))
-                value = {axis: number for axis, (_, number) in where.items()}
-                modulus, poisson = value["youngs_modulus_MPa"] * MEGAPASCAL, value["poisson_ratio"]
-                rayleigh = contact_law.rayleigh_time_step(0.5 * smallest, material.density, modulus, poisson)
-                step = packing.time_step(rayleigh, value["friction"])
-                keys = {
-                    "cohesion": where["cohesion_kJ_m3"],
-                    "time_step": _time_step_key(packing, step / rayleigh),
-                    "restitution": where["restitution"],
-                    "density": ("material.density_kg_m3", material.density),
-                }
-                yield (
-                    keys,
-                    limits.Numbers(
-                        smallest=smallest,
-                        density=material.density,
-                        youngs_modulus=modulus,
-                        poisson_ratio=poisson,
-                        restitution=value["restitution"],
-                        friction=value["friction"],
-                        cohesion=value["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
-                        time_step=step,
-                        engine=packing.engine,
-                    ),
-                )
+        known = [name for name in sweep.csd or [] if name in csds]
+        for name, places in itertools.product(known, itertools.product(*axes)):
+            where = dict(zip(SWEPT, places, strict=True))
+            scene = scene_of(model, csds[name].truncated, {axis: value for axis, (_, value) in where.items()})
+            keys = {
+                "cohesion": where["cohesion_kJ_m3"],
+                "time_step": _time_step_key(model.packing, scene.rayleigh_fraction),
+                "restitution": where["restitution"],
+                "density": ("material.density_kg_m3", model.material.density),
+            }
+            yield keys, scene
 
 
 def _time_step_key(packing: Packing, fraction: float) -> tuple[str, float]:

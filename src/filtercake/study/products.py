@@ -1,4 +1,4 @@
-"""What a crystallizer gives a study: a distribution per residence time, and the density of the crystals."""
+"""Products of a crystallizer: a distribution per residence time, and the density of the crystals."""
 
 from __future__ import annotations
 
@@ -33,21 +33,11 @@ def product_name(residence_time_min: float) -> str:
 def resolve(model: Study, path: Path) -> tuple[Study, Kinetics | None, list[str]]:
     """Give the residence times of sweeps a distribution each, and the material the kinetics' density if it has none.
 
-    Parameters
-    ----------
-    model : Study
-        The study as it is written.
-    path : Path
-        Its file.
-
     Returns
     -------
-    Study
-        With a distribution for every product; published values of other kinetics are left out.
-    Kinetics or None
-        The crystallizer's.
-    list of str
-        Warnings.
+    tuple of Study, Kinetics or None, list of str
+        The study with a distribution for every product, without published values of other kinetics; the crystallizer's
+        kinetics; warnings.
 
     Raises
     ------
@@ -88,7 +78,7 @@ def slurry_problems(model: Study, file: str) -> Iterator[Problem]:
 
 
 def _without_crystallizer(model: Study, file: str) -> Iterator[Problem]:
-    """Name what only a crystallizer could give."""
+    """Keys that need a crystallizer, in a study without one."""
     asked = [
         f"csds.{name}.residence_time_min" for name, csd in model.csds.items() if csd.residence_time_min is not None
     ]

@@ -15,7 +15,6 @@ STANDARD_ERRORS = 2.0
 """Combined standard errors within which two means agree."""
 LARGEST_STANDARD_ERROR = 0.001
 """Combined standard error of the porosity up to which a comparison says anything."""
-CASE = ("csd", *SWEPT, "particles")
 
 
 def compare_engines(replicates: pd.DataFrame, reference: str, other: str) -> pd.DataFrame:

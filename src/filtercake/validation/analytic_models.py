@@ -24,31 +24,6 @@ RODS: Final = 10_000
 """Rods that stand for a distribution; see :func:`farr_groot` for what that resolves."""
 
 
-def initial_porosity(mean_diameter: float, vessel_diameter: float) -> float:
-    """Porosity of equal spheres in a vessel, for :func:`ouchiyama_tanaka` (paper, eq. 15; Nagy et al.).
-
-    ``eps0 = 0.375 + 0.34 Dm / D_vessel``: the second term is the looser layer at the wall.
-
-    Parameters
-    ----------
-    mean_diameter : float
-        Number-mean sphere diameter Dm (:meth:`CrystalSizeDistribution.mean_size` of 1, 0), m.
-    vessel_diameter : float
-        Diameter of the filter medium, m. A hundred mean spheres across leave eps0 at 0.375 to 1 %.
-
-    Raises
-    ------
-    ValueError
-        If a diameter is not positive and finite, or the mean sphere is wider than the vessel.
-    """
-    for name, diameter in (("mean diameter", mean_diameter), ("vessel diameter", vessel_diameter)):
-        if not 0.0 < diameter < np.inf:
-            raise ValueError(f"{name} {diameter:g} m is not positive and finite")
-    if mean_diameter > vessel_diameter:
-        raise ValueError(f"spheres of {mean_diameter:g} m do not fit in a vessel of {vessel_diameter:g} m")
-    return 0.375 + 0.34 * mean_diameter / vessel_diameter
-
-
 def ouchiyama_tanaka(csd: CrystalSizeDistribution, eps0: float = 0.375) -> float:
     """Porosity of a random packing by Ouchiyama & Tanaka, the model the paper compares itself with.
 
@@ -66,7 +41,7 @@ def ouchiyama_tanaka(csd: CrystalSizeDistribution, eps0: float = 0.375) -> float
     csd : CrystalSizeDistribution
         The distribution; only the ratios of its sizes matter.
     eps0 : float
-        Porosity of equal spheres, in (0, 1); see :func:`initial_porosity`.
+        Porosity of equal spheres, in (0, 1); the paper (eq. 15) takes 0.375 in a filter many spheres wide.
 
     Returns
     -------

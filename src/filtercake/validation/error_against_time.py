@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,14 +16,13 @@ import numpy as np
 import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution, truncate
-from filtercake.packing import contact_law
-from filtercake.packing.cloud import PLACEMENT_HEIGHT, box_length
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
-from filtercake.packing.engines.liggghts_as_published import STEPS, LiggghtsAsPublished
+from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
+from filtercake.packing.pack import Report
 from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.study import limits
 from filtercake.units import GRAVITY, MEGAPASCAL, MICROMETRE, MICROSECOND
 from filtercake.validation.analytic_models import PEERS
@@ -81,8 +80,6 @@ REFERENCE_COLUMNS = (
 )
 """Columns of ``replicates.csv`` that are kept of the reference ensembles."""
 
-Report = Callable[[str], None]
-
 
 @dataclass(frozen=True)
 class Variant:
@@ -96,8 +93,6 @@ class Variant:
         How much of it.
     contender : Contender
         What is packed and by what.
-    csd : CrystalSizeDistribution
-        The (truncated) distribution.
     replicates : int
         Packings of the ensemble.
     """
@@ -105,7 +100,6 @@ class Variant:
     axis: str
     value: float
     contender: Contender
-    csd: CrystalSizeDistribution
     replicates: int
 
 
@@ -123,14 +117,14 @@ class Reference:
     standard_error: float
 
 
-def variants(case: str, base: PackingSpec, full: CrystalSizeDistribution, quick: bool = False) -> list[Variant]:
+def variants(case: str, base: Scene, full: CrystalSizeDistribution, quick: bool = False) -> list[Variant]:
     """List a case's variants, the default first.
 
     Parameters
     ----------
     case : {"pmma", "pmma_friction", "alum", "alum_wide"}
         Which case.
-    base : PackingSpec
+    base : Scene
         The scene at the configuration's defaults.
     full : CrystalSizeDistribution
         The whole distribution.
@@ -152,46 +146,34 @@ QUICK_LEAST = 8
 class _Maker:
     """Makes variants of one scene."""
 
-    def __init__(self, base: PackingSpec, full: CrystalSizeDistribution):
-        self.base = replace(base, engine=Embedded.name, processes=1)
-        self.full = full
-        self.csd = truncate(full, 0.001).csd if full.size.size > 2 else full
-        self.rayleigh = base.time_step / base.rayleigh_fraction(self.csd.smallest)
+    def __init__(self, base: Scene, full: CrystalSizeDistribution):
+        self.base, self.full = replace(base, engine=Embedded.name, processes=1), full
 
     def default(self, replicates: int) -> Variant:
-        return self.one(DEFAULT, self.base.time_step / self.rayleigh, replicates)
+        return self.one(DEFAULT, self.base.rayleigh_fraction, replicates)
 
     def one(self, axis: str, value: float, replicates: int, *, engine: str = Embedded.name, **changed: Any) -> Variant:
-        spec = replace(self.base, **changed)
-        return Variant(axis, value, contender(engine, spec), self.csd, replicates)
+        return Variant(axis, value, contender(engine, replace(self.base, **changed)), replicates)
 
     def time_steps(self, given: Mapping[float, int], engine: str = Embedded.name) -> list[Variant]:
         return [
-            self.one("time step", value, n, engine=engine, time_step=value * self.rayleigh)
+            self.one("time step", value, n, engine=engine, time_step=self.base.with_time_step(value).time_step)
             for value, n in given.items()
         ]
 
     def truncations(self, given: Mapping[float, int]) -> list[Variant]:
         found = []
         for value, replicates in given.items():
-            csd = truncate(self.full, value).csd
-            step = self.base.time_step * csd.smallest / self.csd.smallest  # the Rayleigh step follows the smallest size
-            spec = replace(self.base, time_step=step)
-            found.append(Variant("truncation", value, contender(Embedded.name, spec), csd, replicates))
+            scene = replace(self.base, csd=truncate(self.full, value).csd).with_time_step(self.base.rayleigh_fraction)
+            found.append(Variant("truncation", value, contender(Embedded.name, scene), replicates))
         return found
 
     def softer(self, given: Mapping[float, int]) -> list[Variant]:
-        """Softer contacts of the same sticking speed: s ~ E^0.8; the Rayleigh step grows as 1/sqrt(E)."""
-        found = []
-        for value, replicates in given.items():
-            ratio = value * MEGAPASCAL / self.base.youngs_modulus
-            changed = {
-                "youngs_modulus": value * MEGAPASCAL,
-                "cohesion": self.base.cohesion * ratio**0.8,
-                "time_step": self.base.time_step / math.sqrt(ratio),
-            }
-            found.append(self.one("softer contacts", value, replicates, **changed))
-        return found
+        """Softer contacts of the same sticking speed."""
+        return [
+            self.one("softer contacts", value, replicates, **_of_modulus(self.base, value * MEGAPASCAL))
+            for value, replicates in given.items()
+        ]
 
     def liggghts(self, replicates: int) -> list[Variant]:
         return [self.one("engine", 0.0, replicates, engine=Liggghts.name)] if _runs(Liggghts.name) else []
@@ -200,7 +182,14 @@ class _Maker:
         if not _runs(LiggghtsAsPublished.name):
             return []
         made = contender(LiggghtsAsPublished.name, self.base, step, skin, steps)
-        return [Variant("as published", float(steps), made, self.csd, replicates)]
+        return [Variant("as published", float(steps), made, replicates)]
+
+
+def _of_modulus(scene: Scene, youngs_modulus: float) -> dict[str, Any]:
+    """Contacts of another stiffness (Pa) and the same sticking speed: s ~ E^0.8, at the same Rayleigh fraction."""
+    cohesion = scene.cohesion * (youngs_modulus / scene.youngs_modulus) ** 0.8
+    made = replace(scene, youngs_modulus=youngs_modulus, cohesion=cohesion).with_time_step(scene.rayleigh_fraction)
+    return {name: getattr(made, name) for name in ("youngs_modulus", "cohesion", "time_step")}
 
 
 def _runs(engine: str) -> bool:
@@ -218,7 +207,7 @@ def _pmma(make: _Maker) -> list[Variant]:
     if _runs(Liggghts.name):
         listed += make.time_steps({0.2: 4}, Liggghts.name)
         listed += [make.one("skin", 10.0, 4, engine=Liggghts.name, skin=10.0 * MICROMETRE)]
-    return listed + make.as_published(3, AS_PUBLISHED_STEP["pmma"], STEPS)
+    return listed + make.as_published(3, AS_PUBLISHED_STEP["pmma"], LiggghtsAsPublished.fixed_steps)
 
 
 def _pmma_friction(make: _Maker) -> list[Variant]:
@@ -252,18 +241,18 @@ def time_variants(listed: Iterable[Variant], report: Report = lambda _: None) ->
     """
     chosen = list(listed)
     for variant in chosen:
-        warm_up(variant.contender, variant.csd)
+        warm_up(variant.contender)
     rows = []
     for replicate in range(max(variant.replicates for variant in chosen)):
         for variant in chosen:
             if replicate >= variant.replicates:
                 continue
-            spec = variant.contender.spec
-            row = {"axis": variant.axis, "value": variant.value, "engine": spec.engine, "particles": spec.particles}
-            rows.append({**row, **settle_timed(variant.contender, variant.csd, replicate)})
+            scene = variant.contender.scene
+            row = {"axis": variant.axis, "value": variant.value, "engine": scene.engine, "particles": scene.particles}
+            rows.append({**row, **settle_timed(variant.contender, replicate)})
             last = rows[-1]
             report(
-                f"{spec.engine}, {variant.axis} {variant.value:g}, r{replicate}: {last['wall_s']:.1f} s, "
+                f"{scene.engine}, {variant.axis} {variant.value:g}, r{replicate}: {last['wall_s']:.1f} s, "
                 f"porosity {last['porosity']:.4f} {'' if last['status'] == 'ok' else last['status']}"
             )
     return pd.DataFrame(rows)
@@ -374,8 +363,7 @@ def reference_of(table: pd.DataFrame, study: str, friction: float) -> Reference:
 
 
 def coverage(
-    spec: PackingSpec,
-    csd: CrystalSizeDistribution,
+    scene: Scene,
     reference: Reference,
     interval: float,
     repeats: int,
@@ -385,7 +373,7 @@ def coverage(
 
     Parameters
     ----------
-    spec, csd
+    scene : Scene
         The scene.
     reference : Reference
         Its true porosity.
@@ -403,11 +391,11 @@ def coverage(
     """
     rows = []
     for repeat in range(repeats):
-        asked = replace(spec, seed=COVERAGE_SEED + repeat)
+        asked = replace(scene, seed=COVERAGE_SEED + repeat)
         made = Contender(asked.engine, asked, ENGINES[asked.engine]())
         rule = UntilNarrow(asked, interval)
         for replicate in range(COVERAGE_MOST):
-            found = settle_timed(made, csd, replicate)
+            found = settle_timed(made, replicate)
             if found["status"] == "ok" and rule.add(found["porosity"]):
                 break
         mean = float(np.mean(rule.values))
@@ -452,33 +440,24 @@ class Choice:
     against: Variant
 
 
-def choices(base: PackingSpec, csd: CrystalSizeDistribution, replicates: int) -> list[Choice]:
+def choices(base: Scene, replicates: int) -> list[Choice]:
     """List what the paper's model leaves open, each with the ensemble that shows what it does.
 
     Parameters
     ----------
-    base : PackingSpec
+    base : Scene
         The scene at the defaults.
-    csd : CrystalSizeDistribution
-        Its distribution.
     replicates : int
         Packings of each ensemble.
     """
-    make = _Maker(base, csd)
+    make = _Maker(base, base.csd)
     default = make.default(replicates)
-    height = PLACEMENT_HEIGHT * box_length(make.csd, base.particles, base.initial_void_fraction, base.bed_depth_factor)
 
     def dropped(times: float) -> float:
-        return math.sqrt(base.settling_velocity**2 + 2.0 * GRAVITY * (times - 1.0) * height)
+        return math.sqrt(base.settling_velocity**2 + 2.0 * GRAVITY * (times - 1.0) * base.cloud_height)
 
-    stiff = 50.0
-    ratio = stiff * MEGAPASCAL / base.youngs_modulus
-    stiffer = {
-        "youngs_modulus": stiff * MEGAPASCAL,
-        "cohesion": base.cohesion * ratio**0.8,
-        "time_step": base.time_step / math.sqrt(ratio),
-    }
-    equal = contact_law.relative_overlap(base.cohesion, base.youngs_modulus, base.poisson_ratio)
+    stiffer = _of_modulus(base, 50.0 * MEGAPASCAL)
+    frictional = base.with_time_step(limits.default_time_step(0.05))
     listed: list[tuple[str, str, str, dict[str, Any]]] = [
         ("drop height", "the paper's", "2 times", {"settling_velocity": dropped(2.0)}),
         ("drop height", "the paper's", "10 times", {"settling_velocity": dropped(10.0)}),
@@ -487,17 +466,18 @@ def choices(base: PackingSpec, csd: CrystalSizeDistribution, replicates: int) ->
         ("initial void fraction", f"{base.initial_void_fraction:g}", "0.8", {"initial_void_fraction": 0.8}),
         ("depth of the bed", "2 L of cloud", "4 L of cloud, as many spheres", {"bed_depth_factor": 2.0}),
         ("number of spheres", f"{base.particles:,}", f"{4 * base.particles:,}", {"particles": 4 * base.particles}),
-        ("soft contacts", f"E = 5 MPa ({equal:.2%} overlap)", "E = 50 MPa, same sticking speed", stiffer),
-        ("friction of the crystals", "0", "0.05", {"friction": 0.05, "time_step": _frictional_step(base)}),
+        (
+            "soft contacts",
+            f"E = 5 MPa ({base.relative_overlap:.2%} overlap)",
+            "E = 50 MPa, same sticking speed",
+            stiffer,
+        ),
+        ("friction of the crystals", "0", "0.05", {"friction": 0.05, "time_step": frictional.time_step}),
     ]
     return [
         Choice(choice, own, other, make.one(choice, float(k), replicates, **changed), default)
         for k, (choice, own, other, changed) in enumerate(listed)
     ]
-
-
-def _frictional_step(base: PackingSpec) -> float:
-    return base.time_step * limits.default_time_step(0.05) / limits.default_time_step(0.0)
 
 
 def choice_table(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,19 +11,16 @@ import numpy as np
 import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.packing import contact_law
 from filtercake.packing.engines.embedded import Embedded
-from filtercake.packing.pack import settle
+from filtercake.packing.pack import Report, settle
 from filtercake.packing.result import SettledState
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.validation.timing import Contender, warm_up
 
 SMALLEST = 20e-6
 """Diameter of the smallest class, m."""
 CLASSES = 10
 """Size classes, evenly spaced in log size, each with the same volume."""
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,7 @@ class Case:
     Attributes
     ----------
     series : {"particles", "size_ratio"}
-        What grows.
+        Quantity that is varied.
     particles : int
         Number of spheres.
     size_ratio : float
@@ -53,7 +50,7 @@ def even_distribution(size_ratio: float) -> CrystalSizeDistribution:
     return CrystalSizeDistribution.from_classes(sizes, np.full(CLASSES, 1.0 / CLASSES))
 
 
-def time_growth(base: PackingSpec, cases: Iterable[Case], report: Report = lambda _: None) -> pd.DataFrame:
+def time_growth(base: Scene, cases: Iterable[Case], report: Report = lambda _: None) -> pd.DataFrame:
     """Time the whole settling of each case, on one core.
 
     A machine's pace changes within minutes: the first case is timed anew before and after every other one, and
@@ -61,12 +58,12 @@ def time_growth(base: PackingSpec, cases: Iterable[Case], report: Report = lambd
 
     Parameters
     ----------
-    base : PackingSpec
+    base : Scene
         Material and protocol; the number of spheres and the time step follow the case.
     cases : iterable of Case
-        What is timed, in this order.
+        Beds that are timed, in this order.
     report : callable
-        Takes a line per case.
+        Receives a line per case.
 
     Returns
     -------
@@ -90,18 +87,13 @@ def time_growth(base: PackingSpec, cases: Iterable[Case], report: Report = lambd
     return pd.DataFrame(rows)
 
 
-def _time(base: PackingSpec, case: Case) -> tuple[SettledState, float]:
+def _time(base: Scene, case: Case) -> tuple[SettledState, float]:
     """Settle a bed; return what became of it, and its time per sphere and step, ns."""
     csd = even_distribution(case.size_ratio)
-    fraction = base.time_step / _rayleigh(base, 0.5 * SMALLEST)
-    step = fraction * _rayleigh(base, 0.5 * csd.smallest)
-    spec = replace(base, engine=Embedded.name, particles=case.particles, time_step=step, processes=1)
-    contender = Contender(Embedded.name, spec, Embedded())
-    warm_up(contender, csd)
+    scene = replace(base, csd=csd, engine=Embedded.name, particles=case.particles, processes=1)
+    scene = scene.with_time_step(base.rayleigh_fraction)
+    contender = Contender(Embedded.name, scene, Embedded())
+    warm_up(contender)
     with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
-        state = settle(spec, csd, 0, Path(folder), engine=contender.engine).state
+        state = settle(scene, 0, Path(folder), engine=contender.engine).state
     return state, 1e9 * state.wall_time / state.steps / case.particles
-
-
-def _rayleigh(spec: PackingSpec, radius: float) -> float:
-    return contact_law.rayleigh_time_step(radius, spec.density, spec.youngs_modulus, spec.poisson_ratio)

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import pandas as pd
 
 from filtercake.study import limits
+from filtercake.user_files import templates
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
-from filtercake.validation.stability import COVERAGE, OUTCOMES, WRONG, families, undetected
+from filtercake.validation.stability import COVERAGE, OUTCOMES, families, undetected, wrong
 
 INTERIOR, COUNT = "interior slab", "count"
 PAPER = "as published"
@@ -23,12 +23,8 @@ FAILING = ("inaccurate", "unsettled", "exploded", "refused")
 def reference_table(replicates: pd.DataFrame, cases: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Tabulate the reference of every case: case, porosity, standard_error, n.
 
-    Parameters
-    ----------
-    replicates : DataFrame
-        The committed reference packings, rows of ``replicates.csv``.
-    cases : mapping
-        Each case's ``reference`` (a study's name) and ``friction``.
+    ``replicates`` are the committed reference packings; ``cases`` hold each case's ``reference`` (a study) and
+    ``friction``.
     """
     rows = []
     for name, case in cases.items():
@@ -48,20 +44,10 @@ def benchmark(
 ) -> str:
     """Write the page on run time and error.
 
-    Parameters
-    ----------
-    template : Path
-        The page's prose.
-    errors : DataFrame
-        Of :func:`filtercake.validation.error_against_time.errors`, all cases, with ``on_front``.
-    references : DataFrame
-        Of :func:`reference_table`.
-    choices : DataFrame
-        Of :func:`filtercake.validation.error_against_time.choice_table`.
-    coverage : DataFrame
-        Of :func:`filtercake.validation.error_against_time.coverage`.
-    data : Path
-        Folder of the committed results of long computations, whose tables the page shows too.
+    The tables are those of :func:`filtercake.validation.error_against_time.errors` (all cases, with ``on_front``),
+    :func:`reference_table`, :func:`~filtercake.validation.error_against_time.choice_table` and
+    :func:`~filtercake.validation.error_against_time.coverage`; ``data`` is the folder of the committed results of long
+    computations, whose tables the page shows too.
     """
     stored = [path for path in sorted(data.glob("*.csv")) if "replicates" not in path.stem]
     tables = {path.stem: _records(pd.read_csv(path)) for path in stored}
@@ -99,7 +85,7 @@ def headline(errors: pd.DataFrame) -> dict[str, Any]:
     if published.empty:
         return found
     paper = _only(published)
-    ours = interior[(interior["engine"] == "embedded") & (interior["n_failed"] == 0)]
+    ours = interior[(interior["engine"] == found["default"]["engine"]) & (interior["n_failed"] == 0)]
     as_good = ours[ours["error"] <= paper["error"]].sort_values("seconds")
     found |= {"published": paper, "times_faster": paper["seconds"] / found["default"]["seconds"]}
     if not as_good.empty:
@@ -130,16 +116,7 @@ def said(errors: pd.DataFrame) -> dict[str, Any]:
 
 
 def stability(template: Path, table: pd.DataFrame) -> str:
-    """Write the page on the stress tests.
-
-    Parameters
-    ----------
-    template : Path
-        The page's prose.
-    table : DataFrame
-        Of :func:`filtercake.validation.stability.run`, all families.
-    """
-    wrong = (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
+    """Write the page on the stress tests of all families (see :func:`filtercake.validation.stability.run`)."""
     return _render(
         template,
         outcomes=OUTCOMES,
@@ -155,7 +132,7 @@ def stability(template: Path, table: pd.DataFrame) -> str:
         limits=vars(limits),
         total=len(table),
         absent=[name for name in families() if name not in set(table["family"])],
-        wrong=_records(table[wrong]),
+        wrong=_records(table[wrong(table)]),
         undetected=_records(undetected(table)),
         drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),
         gain=float(table.loc[(table["outcome"] == OK) & (table["fence"] == "allowed"), "energy_gain"].max()),
@@ -194,13 +171,8 @@ def _range(some: list[float], every: list[float]) -> str:
 def reliability(template: Path, table: pd.DataFrame) -> str:
     """Write the page on injected faults.
 
-    Parameters
-    ----------
-    template : Path
-        The page's prose.
-    table : DataFrame
-        One row per fault: seed and round (the sweep it hit), family, kind, target, lost, accepted, left, commands,
-        equal.
+    The table has one row per fault: seed and round (the sweep it hit), family, kind, target, lost, accepted, left,
+    commands, equal.
     """
     groups = {str(name): group for name, group in table.groupby("family", sort=False)}
     return _render(
@@ -231,15 +203,7 @@ def _words(rows: pd.DataFrame) -> str:
 
 
 def _render(template: Path, **values: Any) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(template.parent),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # Markdown, from our own tables
-    )
-    return environment.get_template(template.name).render(**values)
+    return templates(template.parent).get_template(template.name).render(**values)
 
 
 def _records(table: pd.DataFrame) -> list[dict[str, Any]]:

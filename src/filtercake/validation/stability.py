@@ -7,11 +7,12 @@ scene settled with a small time step.
 
 from __future__ import annotations
 
+import itertools
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,16 @@ import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError, EngineError, PackingRejected
-from filtercake.packing import contact_law
 from filtercake.packing.accept import accept
-from filtercake.packing.cloud import PLACEMENT_HEIGHT, Cloud, box_length
-from filtercake.packing.engines import get_engine
+from filtercake.packing.cloud import Cloud
+from filtercake.packing.engines import Engine, get_engine
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.packing.engines.micro import SI
-from filtercake.packing.pack import settle
+from filtercake.packing.pack import Report, settle
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, SettledState
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.study import limits
 from filtercake.units import GRAVITY, KILOJOULE_PER_M3, MEGAPASCAL
 
@@ -77,37 +77,26 @@ COLUMNS = (
     "reason",
 )
 
-Report = Callable[[str], None]
 
-
-@dataclass(frozen=True)
-class Scene:
-    """What is settled: the physics, without a choice of numbers.
-
-    Attributes
-    ----------
-    cohesion_kJ_m3, youngs_modulus_MPa, restitution, friction : float
-        The material.
-    density_kg_m3 : float
-        Crystal density.
-    size_ratio : float
-        Large over small size of a mixture of two sizes with the same volume (one size at 1).
-    drop_height : float
-        Height from which the spheres are released, over the paper's.
-    """
-
-    cohesion_kJ_m3: float = 50.0  # noqa: N815
-    youngs_modulus_MPa: float = 5.0  # noqa: N815
-    restitution: float = 0.3
-    friction: float = 0.0
-    density_kg_m3: float = 1180.0
-    size_ratio: float = 2.5
-    drop_height: float = 1.0
+BASE = {
+    "cohesion_kJ_m3": 50.0,
+    "youngs_modulus_MPa": 5.0,
+    "restitution": 0.3,
+    "friction": 0.0,
+    "density_kg_m3": 1180.0,
+    "size_ratio": 2.5,
+    "drop_height": 1.0,
+    "time_step": 0.0,
+    "skin": 0.0,
+}
+"""What the axes of maps start from: the material; large over small size of a mixture of two sizes with the same volume
+(one size at 1); the height from which the spheres are released, over the paper's; the time step over the Rayleigh step
+(0 for the default); and the skin over the smallest diameter (0 lets the engine choose)."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One scene with one choice of numbers.
+    """One place on a map: a scene that differs from the base in two numbers, and the engine that settles it.
 
     Attributes
     ----------
@@ -116,15 +105,9 @@ class Case:
     engine : str
         ``embedded``, ``liggghts`` or ``liggghts_si``.
     x_name, y_name : str
-        What the map's axes are.
+        What the map's axes are: names in ``BASE``.
     x, y : float
         Its place on the map.
-    scene : Scene
-        The physics.
-    time_step : float
-        Over the Rayleigh step of the smallest sphere; 0 for the default.
-    skin : float
-        Neighbour skin over the smallest diameter; 0 lets the engine choose.
     """
 
     family: str
@@ -133,9 +116,11 @@ class Case:
     x: float
     y_name: str
     y: float
-    scene: Scene = field(default_factory=Scene)
-    time_step: float = 0.0
-    skin: float = 0.0
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Values of all that is in ``BASE``."""
+        return {**BASE, self.x_name: self.x, self.y_name: self.y}
 
 
 def cases(engines: Iterable[str], family: str = "", quick: bool = False) -> list[Case]:
@@ -164,13 +149,8 @@ def families() -> tuple[str, ...]:
 def _grid(
     family: str, engine: str, x_name: str, xs: Iterable[float], y_name: str, ys: Iterable[float]
 ) -> Iterable[Case]:
-    """Cases at every combination; an axis is named after the field of the case or of its scene that it sets."""
-    columns = tuple(ys)
-    for x in xs:
-        for y in columns:
-            asked = {x_name: x, y_name: y}
-            numbers = {name: asked.pop(name) for name in ("time_step", "skin") if name in asked}
-            yield Case(family, engine, x_name, x, y_name, y, Scene(**asked), **numbers)
+    """Cases at every combination."""
+    return [Case(family, engine, x_name, x, y_name, y) for x, y in itertools.product(xs, ys)]
 
 
 def _time_step_cohesion() -> Iterable[Case]:
@@ -262,35 +242,33 @@ def distribution(size_ratio: float) -> tuple[CrystalSizeDistribution, int, float
     return csd, particles, column
 
 
-def spec_of(case: Case) -> tuple[PackingSpec, CrystalSizeDistribution]:
-    """Return what is settled for a case, and of which sizes."""
-    scene = case.scene
-    csd, particles, column = distribution(scene.size_ratio)
-    modulus = scene.youngs_modulus_MPa * MEGAPASCAL
-    rayleigh = contact_law.rayleigh_time_step(0.5 * csd.smallest, scene.density_kg_m3, modulus, 0.2)
-    height = PLACEMENT_HEIGHT * column * box_length(csd, particles, 0.65, column)
-    # released k times as high, the spheres reach the height of the cloud with this speed
-    speed = math.sqrt(0.01**2 + 2.0 * GRAVITY * (scene.drop_height - 1.0) * height)
-    spec = PackingSpec(
+def scene_of(numbers: Mapping[str, float], engine: str) -> Scene:
+    """Return what is settled, from the values of all that is in ``BASE``."""
+    csd, particles, column = distribution(numbers["size_ratio"])
+    scene = Scene(
+        csd=csd,
         particles=particles,
         initial_void_fraction=0.65,
-        settling_velocity=speed,
-        density=scene.density_kg_m3,
-        youngs_modulus=modulus,
+        settling_velocity=0.01,
+        density=numbers["density_kg_m3"],
+        youngs_modulus=numbers["youngs_modulus_MPa"] * MEGAPASCAL,
         poisson_ratio=0.2,
-        restitution=scene.restitution,
-        friction=scene.friction,
-        cohesion=scene.cohesion_kJ_m3 * KILOJOULE_PER_M3,
-        time_step=(case.time_step or limits.default_time_step(scene.friction)) * rayleigh,
-        engine=case.engine,
-        skin=case.skin * csd.smallest,
+        restitution=numbers["restitution"],
+        friction=numbers["friction"],
+        cohesion=numbers["cohesion_kJ_m3"] * KILOJOULE_PER_M3,
+        time_step=0.0,
+        engine=engine.removesuffix("_si"),
+        skin=numbers["skin"] * csd.smallest,
         # thrown fast, they are down soon, but rebound as high as if they had fallen
-        max_fall_times=4.0 * scene.drop_height,
+        max_fall_times=4.0 * numbers["drop_height"],
         time_limit=TIME_LIMIT,
         bed_depth_factor=column,
         processes=1,
     )
-    return spec, csd
+    # released k times as high, the spheres reach the height of the cloud with this speed
+    speed = math.sqrt(scene.settling_velocity**2 + 2.0 * GRAVITY * (numbers["drop_height"] - 1.0) * scene.cloud_height)
+    step = numbers["time_step"] or limits.default_time_step(scene.friction)
+    return replace(scene, settling_velocity=speed).with_time_step(step)
 
 
 def run(listed: Iterable[Case], report: Report = lambda _: None, replicates: int = 0) -> pd.DataFrame:
@@ -313,9 +291,10 @@ def run(listed: Iterable[Case], report: Report = lambda _: None, replicates: int
     references: dict[Scene, list[float]] = {}
     rows = []
     for case in listed:
-        if case.scene not in references:
-            references[case.scene] = _reference(case.scene, replicates or REFERENCE_REPLICATES)
-        row = _judge(case, references[case.scene], replicates or REPLICATES.get(case.engine, REPLICATES[Liggghts.name]))
+        reference = reference_scene(case)
+        if reference not in references:
+            references[reference] = _reference(reference, replicates or REFERENCE_REPLICATES)
+        row = _judge(case, references[reference], replicates or REPLICATES.get(case.engine, REPLICATES[Liggghts.name]))
         report(
             f"{case.engine}, {case.x_name} {case.x:g}, {case.y_name} {case.y:g}: {row['outcome']}, "
             f"bias {row['bias']:+.4f}, {row['seconds']:.1f} s"
@@ -324,21 +303,19 @@ def run(listed: Iterable[Case], report: Report = lambda _: None, replicates: int
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _reference(scene: Scene, replicates: int) -> list[float]:
-    """Porosities of the accepted packings of a scene at a small time step; a scene may have none.
+def reference_scene(case: Case) -> Scene:
+    """Return a case's physics at a small time step, from the same clouds: what a cloud does to its bed is no error."""
+    scene = scene_of({**case.numbers, "time_step": 0.0, "skin": 0.0}, Embedded.name)
+    times = 2.0 * scene.max_fall_times
+    scene = replace(scene, porosity_tolerance=REFERENCE_TOLERANCE, max_fall_times=times)
+    return scene.with_time_step(FRICTIONAL_REFERENCE_STEP if scene.friction > 0.0 else REFERENCE_STEP)
 
-    From the same clouds as the case: what a cloud does to its bed is no error of the numbers.
-    """
-    step = FRICTIONAL_REFERENCE_STEP if scene.friction > 0.0 else REFERENCE_STEP
-    spec, csd = spec_of(Case("reference", Embedded.name, "", 0.0, "", 0.0, scene, time_step=step))
-    spec = replace(
-        spec,
-        porosity_tolerance=REFERENCE_TOLERANCE,
-        max_fall_times=2.0 * spec.max_fall_times,
-    )
+
+def _reference(scene: Scene, replicates: int) -> list[float]:
+    """Porosities of the accepted packings of a scene at a small time step; a scene may have none."""
     found: list[float] = []
-    for replicate in range(_number(spec, replicates)):
-        result = _try(spec, csd, replicate)
+    for replicate in range(_number(scene, replicates)):
+        result = _try(scene, Embedded(), replicate)
         if result.outcome == "ok":
             found.append(result.porosity)
         elif replicate + 1 == HOPELESS and not found:
@@ -346,9 +323,9 @@ def _reference(scene: Scene, replicates: int) -> list[float]:
     return found
 
 
-def _number(spec: PackingSpec, replicates: int) -> int:
+def _number(scene: Scene, replicates: int) -> int:
     """Packings of a case: fewer where one takes long."""
-    slow = spec.particles > PARTICLES or spec.rayleigh_fraction(SMALL) < SLOW_STEP
+    slow = scene.particles > PARTICLES or scene.rayleigh_fraction < SLOW_STEP
     return max(2, replicates // 3) if slow else replicates
 
 
@@ -366,10 +343,11 @@ class _Try:
 
 
 def _judge(case: Case, reference: list[float], replicates: int) -> dict[str, Any]:
-    spec, csd = spec_of(case)
+    scene = scene_of(case.numbers, case.engine)
+    engine = Liggghts(units=SI) if case.engine == SI_UNITS else get_engine(case.engine)
     tries: list[_Try] = []
-    for replicate in range(_number(spec, replicates)):
-        tries.append(_try(spec, csd, replicate))
+    for replicate in range(_number(scene, replicates)):
+        tries.append(_try(scene, engine, replicate))
         if len(tries) == HOPELESS and all(result.outcome != "ok" for result in tries):
             break
     values = np.array([result.porosity for result in tries if result.outcome == "ok"])
@@ -398,51 +376,36 @@ def _judge(case: Case, reference: list[float], replicates: int) -> dict[str, Any
     }
 
 
-def _numbers(spec: PackingSpec, csd: CrystalSizeDistribution) -> limits.Numbers:
-    return limits.Numbers(
-        smallest=csd.smallest,
-        density=spec.density,
-        youngs_modulus=spec.youngs_modulus,
-        poisson_ratio=spec.poisson_ratio,
-        restitution=spec.restitution,
-        friction=spec.friction,
-        cohesion=spec.cohesion,
-        time_step=spec.time_step,
-        engine=spec.engine,
-    )
-
-
-def _try(spec: PackingSpec, csd: CrystalSizeDistribution, replicate: int) -> _Try:
+def _try(scene: Scene, engine: Engine, replicate: int) -> _Try:
     """Settle once and say how it ended; never raises for what a scene may do."""
-    engine = Liggghts(units=SI) if spec.engine == SI_UNITS else get_engine(spec.engine)
     with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
         try:
-            settled = settle(spec, csd, replicate, Path(folder), engine=engine)
+            settled = settle(scene, replicate, Path(folder), engine=engine)
         except CloudError as error:
             return _Try("refused", str(error))
         except EngineError as error:
             return _Try(error.outcome, str(error))
     state = settled.state
     recorded: dict[str, Any] = {
-        "energy_gain": energy_gain(state, spec, settled.cloud),
+        "energy_gain": energy_gain(state, scene, settled.cloud),
         "momentum_drift": momentum_drift(state),
         "seconds": state.wall_time,
     }
     try:
-        accepted = accept(state, spec, settled.cloud, settled.rule)
+        accepted = accept(state, scene, settled.cloud, settled.rule)
     except PackingRejected as error:
         return _Try(error.outcome, str(error), **recorded)
-    porosity = measure(Packing(state.position, state.radius, state.length), spec).interior
+    porosity = measure(Packing(state.position, state.radius, state.length), scene).interior
     return _Try("ok", porosity=porosity, overlap=accepted["overlap_max"], **recorded)
 
 
-def energy_gain(state: SettledState, spec: PackingSpec, cloud: Cloud) -> float:
+def energy_gain(state: SettledState, scene: Scene, cloud: Cloud) -> float:
     """Largest rise of the bed's mechanical energy between two checks, over what it started with.
 
     Gravity and impacts can only spend what the spheres started with; a rise is the integration's own work, or what
     cohesion gives when contacts close (negligible beside the fall). Rotation is not counted.
     """
-    mass = spec.density * 4.0 / 3.0 * np.pi * cloud.radius**3
+    mass = scene.density * 4.0 / 3.0 * np.pi * cloud.radius**3
     record = state.trajectory
     energy = record.kinetic_energy + float(mass.sum()) * GRAVITY * record.mean_height
     if not np.isfinite(energy).all():
@@ -467,13 +430,17 @@ def with_fence(table: pd.DataFrame) -> pd.DataFrame:
     """
     known = {(c.family, c.engine, c.x, c.y): c for c in cases({str(e).removesuffix("_si") for e in table["engine"]})}
     keys = table[["family", "engine", "x", "y"]].itertuples(index=False, name=None)
-    return table.assign(fence=[limits.verdict(_numbers(*spec_of(known[key]))) for key in keys])
+    return table.assign(fence=[limits.verdict(scene_of(known[key].numbers, known[key].engine)) for key in keys])
+
+
+def wrong(table: pd.DataFrame) -> pd.Series[bool]:
+    """Whether the mean porosity of a row's accepted packings is off by more than ``WRONG`` beyond doubt."""
+    return (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
 
 
 def undetected(table: pd.DataFrame) -> pd.DataFrame:
     """Rows whose accepted packings are wrong, though the configuration would let them pass without a word."""
-    wrong = (table["bias"].abs() - COVERAGE * table["bias_se"] > WRONG) & (table["n_accepted"] > 0)
-    return table[wrong & (table["fence"] == "allowed")]
+    return table[wrong(table) & (table["fence"] == "allowed")]
 
 
 def _standard_error(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:

@@ -6,7 +6,7 @@ import math
 import resource
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,11 @@ from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
 from filtercake.packing.engines import Engine, get_engine
-from filtercake.packing.engines.embedded import Embedded
-from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
-from filtercake.packing.pack import settle
+from filtercake.packing.pack import Report, settle
 from filtercake.packing.porosity import measure
 from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 
 WARM_UP_PARTICLES = 60
 """Spheres packed before the clock starts: the embedded engine's kernels are compiled once per machine."""
@@ -32,8 +30,6 @@ MEGABYTE = 1024.0
 """Kibibytes in the unit of the table's memory."""
 
 POROSITIES = ("porosity", "porosity_from_floor", "porosity_paper_count")
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -44,40 +40,40 @@ class Contender:
     ----------
     name : str
         For the table.
-    spec : PackingSpec
+    scene : Scene
         What is packed.
     engine : Engine
         By what.
     """
 
     name: str
-    spec: PackingSpec
+    scene: Scene
     engine: Engine
 
 
-def contender(name: str, spec: PackingSpec, time_step: float = 0.0, skin: float = 0.0, steps: int = 0) -> Contender:
-    """Make a contender of an engine's name; the last three are for the as-published protocol.
+def contender(name: str, scene: Scene, time_step: float = 0.0, skin: float = 0.0, steps: int = 0) -> Contender:
+    """Make a contender of an engine's name; the last three are for an engine of a fixed number of steps.
 
     Parameters
     ----------
     name : str
         Name of the engine.
-    spec : PackingSpec
+    scene : Scene
         The scene, at the time step of the tuned engines.
     time_step, skin : float
         Those of the published protocol, s and m; a skin of 0 is one largest diameter.
     steps : int
         Its fixed number of time steps.
     """
-    if name == LiggghtsAsPublished.name:
-        scene = replace(spec, engine=name, time_step=time_step, skin=skin)
-        return Contender(name, scene, LiggghtsAsPublished(steps))
-    return Contender(name, replace(spec, engine=name), get_engine(name))
+    engine = get_engine(name)
+    if engine.fixed_steps:
+        engine.fixed_steps = steps
+        scene = replace(scene, time_step=time_step, skin=skin)
+    return Contender(name, replace(scene, engine=name), engine)
 
 
 def time_in_turn(
     contenders: Iterable[Contender],
-    csd: CrystalSizeDistribution,
     replicates: int,
     report: Report = lambda _: None,
 ) -> pd.DataFrame:
@@ -91,26 +87,27 @@ def time_in_turn(
     """
     listed = list(contenders)
     for each in listed:
-        warm_up(each, csd)
+        warm_up(each)
     rows: list[dict[str, Any]] = []
     for replicate in range(replicates):
         for each in listed:
-            rows.append({"engine": each.name, "particles": each.spec.particles, **settle_timed(each, csd, replicate)})
+            rows.append({"engine": each.name, "particles": each.scene.particles, **settle_timed(each, replicate)})
             last = rows[-1]
             report(f"{each.name} r{replicate}: {last['wall_s']:.1f} s, porosity {last['porosity']:.4f}")
     return pd.DataFrame(rows)
 
 
-def warm_up(each: Contender, csd: CrystalSizeDistribution) -> None:
-    """Let the embedded engine compile what the contender needs: once per machine, and not what is timed."""
-    if isinstance(each.engine, Embedded):
-        few = replace(each.spec, particles=min(WARM_UP_PARTICLES, each.spec.particles), initial_void_fraction=0.8)
-        narrow = CrystalSizeDistribution.from_classes([csd.smallest], [1.0])
+def warm_up(each: Contender) -> None:
+    """Let an engine compile what the contender needs: once per machine, and not what is timed."""
+    if each.engine.compiles:
+        narrow = CrystalSizeDistribution.from_classes([each.scene.csd.smallest], [1.0])
+        particles = min(WARM_UP_PARTICLES, each.scene.particles)
+        few = replace(each.scene, csd=narrow, particles=particles, initial_void_fraction=0.8)
         with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
-            settle(few, narrow, 0, Path(folder), engine=each.engine)
+            settle(few, 0, Path(folder), engine=each.engine)
 
 
-def settle_timed(each: Contender, csd: CrystalSizeDistribution, replicate: int) -> dict[str, Any]:
+def settle_timed(each: Contender, replicate: int) -> dict[str, Any]:
     """Time one packing; one that is not accepted is timed all the same, and says so.
 
     Returns
@@ -122,7 +119,7 @@ def settle_timed(each: Contender, csd: CrystalSizeDistribution, replicate: int) 
     started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="filtercake-") as folder:
         try:
-            settled = settle(each.spec, csd, replicate, Path(folder), engine=each.engine)
+            settled = settle(each.scene, replicate, Path(folder), engine=each.engine)
         except EngineMissing:
             raise
         except (CloudError, EngineError) as error:
@@ -131,10 +128,10 @@ def settle_timed(each: Contender, csd: CrystalSizeDistribution, replicate: int) 
             return {"replicate": replicate, "wall_s": seconds, "steps": 0, "status": str(error), **nothing}
     state, status = settled.state, "ok"
     try:
-        accept(state, each.spec, settled.cloud, settled.rule)
+        accept(state, each.scene, settled.cloud, settled.rule)
     except PackingRejected as error:
         status = str(error)
-    found = measure(Packing(state.position, state.radius, state.length), each.spec)
+    found = measure(Packing(state.position, state.radius, state.length), each.scene)
     return {
         "replicate": replicate,
         "wall_s": state.wall_time,

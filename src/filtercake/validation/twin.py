@@ -22,18 +22,14 @@ def repeat_calibrations(
     Parameters
     ----------
     pool : DataFrame
-        Rows of ``replicates.csv``: packings at several cohesions and one friction; every repeat takes its share of
-        each point's replicates.
+        Rows of ``replicates.csv``: packings at several cohesions and one friction; every repeat takes its share of each
+        point's replicates.
     truth : DataFrame
         Packings, from other seeds, at the one cohesion to be found; their mean resistance is what is measured.
-    repeats : int
-        Number of calibrations.
-    tests : int
-        Measurements of every distribution.
-    noise : float
-        Relative standard deviation of a measurement, which the calibration is told.
-    seed : int
-        Of the noise.
+    repeats, tests : int
+        Number of calibrations, and of measurements of every distribution.
+    noise, seed : float, int
+        Relative standard deviation of a measurement, which the calibration is told, and the seed of the noise.
 
     Returns
     -------

@@ -43,7 +43,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Point]:
     path, point = write_study(home, "embedded")
     csd, results = load_study(path).csds["mine"], home / "results" / "tiny"
     folder = results / "packings" / point.name
-    pack_replicates(point.spec, csd.truncated, 1, folder, packing_code("embedded"))
+    pack_replicates(point.scene, 1, folder, packing_code("embedded"))
     manifest = json.loads((folder / "replicates.json").read_text())
     lost = {"replicate": 1, "status": "failed", "reason": "the bed exploded", "seed": 3, "sha256": "", "attempts": 1}
     manifest["replicates"].append(lost)
@@ -121,15 +121,15 @@ VALUES = st.recursive(
 )
 
 
-@given(key=st.sampled_from(["spec", "replicate", "size_m", "volume_fraction", "engine", "particles"]), value=VALUES)
+@given(key=st.sampled_from(["scene", "replicate", "size", "volume_fraction", "engine", "particles"]), value=VALUES)
 def test_a_spoiled_export_is_refused_or_fails_in_one_line(
     made: tuple[Path, Point], tmp_path_factory: pytest.TempPathFactory, key: str, value: object
 ) -> None:
     folder = tmp_path_factory.mktemp("spoiled") / "out"
     assert run(made, folder, "--replicate", "0") == 0
     found = json.loads((folder / "packing.json").read_text())
-    (found if key in found else found["spec"])[key] = value
-    found["spec"] = {**found["spec"], "particles": "many"} if isinstance(found["spec"], dict) else found["spec"]
+    (found if key in found else found["scene"])[key] = value
+    found["scene"] = {**found["scene"], "particles": "many"} if isinstance(found["scene"], dict) else found["scene"]
     (folder / "packing.json").write_text(json.dumps(found))
     assert main(["rerun", str(folder)]) == 2
 

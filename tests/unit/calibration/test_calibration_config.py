@@ -44,8 +44,8 @@ def test_candidates_are_every_point_in_every_batch(tmp_path: Path) -> None:
     found = candidates(load(tmp_path), lambda *_: "")
     assert len(found) == BATCHES * 2 * 9 * 2
     assert len({item.point.name for item in found}) == len(found)
-    assert {item.point.spec.seed for item in found if item.batch == 0} == {1}
-    assert {item.point.spec.seed for item in found if item.batch == 2} == {3}
+    assert {item.point.scene.seed for item in found if item.batch == 0} == {1}
+    assert {item.point.scene.seed for item in found if item.batch == 2} == {3}
     assert {item.point.replicates for item in found} == {2}
 
 

@@ -15,7 +15,7 @@ from filtercake.crystals.csd import CrystalSizeDistribution, mixture
 from filtercake.errors import CalibrationError
 from filtercake.filtration.drum_filter import DrumFilter, area
 from filtercake.filtration.resistance import kozeny_carman
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.study.points import Point
 from filtercake.units import KILOJOULE_PER_M3
 
@@ -51,11 +51,10 @@ def candidates(frictions: tuple[float, ...] = (0.0,)) -> list[Candidate]:
         for csd in OFFSETS:
             for friction in frictions:
                 for s in COHESIONS:
-                    spec = PackingSpec(
-                        *(2000, 0.65, 0.01, 1180.0, 5e6, 0.2, 0.3, friction, s * KILOJOULE_PER_M3, 3e-7, "embedded")
-                    )
+                    numbers = (2000, 0.65, 0.01, 1180.0, 5e6, 0.2, 0.3, friction, s * KILOJOULE_PER_M3, 3e-7)
+                    scene = Scene(mixture([20e-6], [1.0]), *numbers, "embedded")
                     name = f"{csd}_s{s:g}_mu{friction:g}_b{batch}"
-                    found.append(Candidate(Point(name, "calibration_x", csd, None, 4, spec), batch))
+                    found.append(Candidate(Point(name, "calibration_x", csd, None, 4, scene), batch))
     return found
 
 
@@ -68,7 +67,7 @@ def packed(points: list[Candidate], failed: str = "") -> pd.DataFrame:
     rows = []
     for c in points:
         random = np.random.default_rng([ord(ch) for ch in c.point.name])
-        s, mu = c.point.row()["cohesion_kJ_m3"], c.point.spec.friction
+        s, mu = c.point.row()["cohesion_kJ_m3"], c.point.scene.friction
         for replicate in range(c.point.replicates):
             bad = c.point.name == failed
             value = law(c.point.csd, s, mu) + 0.025 * random.standard_normal()

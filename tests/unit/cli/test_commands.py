@@ -319,7 +319,7 @@ def no_settling(packed: Path, tmp_path_factory: pytest.TempPathFactory) -> Itera
     """Let ``pack`` take packings that are there, whatever is asked for; gives a folder to write to."""
     shelf = tmp_path_factory.mktemp("shelf")
 
-    def take(point: object, csd: object, folder: Path, say: object) -> list[Outcome]:
+    def take(point: object, folder: Path, say: object) -> list[Outcome]:
         shutil.copytree(packed, folder, dirs_exist_ok=True)
         return [Outcome(k, "ok", "", 1, "", 1) for k in (0, 1)]
 

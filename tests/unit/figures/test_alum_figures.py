@@ -15,7 +15,9 @@ from matplotlib.figure import Figure
 
 from filtercake.crystals.csd import mixture
 from filtercake.figures import style
-from filtercake.figures.catalogue import StudyData, draw, figures_of, save
+from filtercake.figures.catalogue import draw, figures_of
+from filtercake.figures.selection import StudyData
+from filtercake.figures.style import save
 from filtercake.figures.truncation import class_edges
 from filtercake.filtration.drum_filter import area, medium_share, resistance_for_cake_share
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman

@@ -17,7 +17,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
 from filtercake.calibration.fit import Observation, Parameter
-from filtercake.calibration.measurements import load_measurements
+from filtercake.calibration.measurements import Measurements, load_measurements
 from filtercake.calibration.rounds import (
     Settings,
     conclude,
@@ -28,16 +28,11 @@ from filtercake.calibration.rounds import (
     summary,
 )
 from filtercake.crystals.csd import mixture
-from filtercake.figures import calibrated, style
-from filtercake.figures.calibrated import (
-    CALIBRATION_FIGURES,
-    CalibrationData,
-    figures_of,
-    module_of,
-    with_interval,
-)
+from filtercake.figures import catalogue, style
+from filtercake.figures.calibrated import CalibrationData, with_interval
 from filtercake.figures.calibration_objective import THRESHOLD, stretches
-from filtercake.figures.catalogue import save
+from filtercake.figures.catalogue import CALIBRATION_FIGURES, figures_of_calibration, module_of
+from filtercake.figures.style import save
 from filtercake.filtration.drum_filter import DrumFilter
 from filtercake.packing.replication import half_width
 
@@ -185,8 +180,13 @@ KNOWN: dict[tuple[str, int], tuple[CalibrationData, Figure]] = {}
 def draw(name: str, data: CalibrationData) -> Figure:
     """Draw a figure, each only once; the data stay, so that their identity does."""
     if (name, id(data)) not in KNOWN:
-        KNOWN[name, id(data)] = data, calibrated.draw(name, data)
+        KNOWN[name, id(data)] = data, catalogue.draw(name, data)
     return KNOWN[name, id(data)][1]
+
+
+def figures_of(predicts: bool) -> list[str]:
+    """Figures of a calibration to known resistances, without pressures."""
+    return figures_of_calibration(predicts, Measurements("", (), (), (), ()))
 
 
 def marked(axes: Axes, gid: str) -> list[Any]:
@@ -220,8 +220,10 @@ class TestCatalogue:
         of_tests = [name for name, figure in CALIBRATION_FIGURES.items() if figure.of_tests]
         assert figures_of(True) == [name for name in CALIBRATION_FIGURES if name not in of_tests]
         measurements = load_measurements(EXAMPLE)
-        assert figures_of(True, measurements) == list(CALIBRATION_FIGURES)
-        assert set(figures_of(False, measurements)) == set(CALIBRATION_FIGURES) - {"calibration_predictions"}
+        assert figures_of_calibration(True, measurements) == list(CALIBRATION_FIGURES)
+        assert set(figures_of_calibration(False, measurements)) == set(CALIBRATION_FIGURES) - {
+            "calibration_predictions"
+        }
         assert of_tests == ["filtration_fits", "compressibility"]
 
     def test_every_figure_has_its_module(self) -> None:

@@ -20,7 +20,9 @@ from matplotlib.figure import Figure
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
 from filtercake.figures import cross_section, profile, style, trajectory
-from filtercake.figures.catalogue import FIGURES, StudyData, draw, save
+from filtercake.figures.catalogue import FIGURES, draw
+from filtercake.figures.selection import StudyData
+from filtercake.figures.style import save
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman
 from filtercake.packing.porosity import slab_porosity
 from filtercake.packing.replication import half_width

@@ -21,7 +21,7 @@ UM = 1e-6
 
 def judge(case: SimpleNamespace, **changes: Any) -> dict[str, Any]:
     state = dataclasses.replace(case.state, **changes)
-    return accept(state, case.spec, case.cloud, case.rule)
+    return accept(state, case.scene, case.cloud, case.rule)
 
 
 def refusal(case: SimpleNamespace, **changes: Any) -> PackingRejected:
@@ -64,7 +64,7 @@ def test_contacts_are_counted_by_hand(settled_lattice: SimpleNamespace) -> None:
     radius, length = case.state.radius, case.state.length * 1.001
     cloud = dataclasses.replace(case.cloud, length=length)
     state = dataclasses.replace(case.state, position=position, length=length, radius=radius)
-    found = accept(state, case.spec, cloud, case.rule)
+    found = accept(state, case.scene, cloud, case.rule)
     assert found["coordination"] == pytest.approx(2 * 5 / 6)
     assert found["overlap_mean"] == pytest.approx(0.001, rel=1e-6)
     assert found["overlap_max"] == pytest.approx(0.001, rel=1e-6)
@@ -75,7 +75,7 @@ def test_a_bed_without_any_contact_has_no_mean_overlap(settled_lattice: SimpleNa
     radius = case.state.radius * 0.99
     found = accept(
         dataclasses.replace(case.state, radius=radius),
-        case.spec,
+        case.scene,
         dataclasses.replace(case.cloud, radius=radius),
         case.rule,
     )
@@ -162,16 +162,16 @@ def test_spheres_outside_the_region_are_refused(
 # --- too deep ------------------------------------------------------------------------------------------------------
 
 
-def test_the_overlap_limit_by_hand(make_spec: Callable[..., Any]) -> None:
+def test_the_overlap_limit_by_hand(make_scene: Callable[..., Any]) -> None:
     # 1.5 times the overlap of a small sphere on a flat one, plus half a percent; d_eq/d of equal spheres at 50 kJ/m3:
     equal = (3 * np.pi * 50e3 * 0.96 / 5e6) ** 2 / 4
     # and twice the Hertz overlap of the small sphere under the weight of the large one
     small, large = 16e-6, 270e-6
-    for cohesive, spec in ((3.0 * equal, make_spec(cohesion=50e3)), (0.0, make_spec(cohesion=0.0))):
-        weight = spec.density * 4 / 3 * np.pi * large**3 * 9.81
+    for cohesive, scene in ((3.0 * equal, make_scene(cohesion=50e3)), (0.0, make_scene(cohesion=0.0))):
+        weight = scene.density * 4 / 3 * np.pi * large**3 * 9.81
         pressed = (weight * 3 * 2 * 0.96 / (4 * 5e6 * np.sqrt(small))) ** (2 / 3) / (2 * small)
         expected = pytest.approx(cohesive + 0.005 + 2 * pressed, rel=1e-12)
-        assert overlap_limit(spec, np.array([small, large])) == expected
+        assert overlap_limit(scene, np.array([small, large])) == expected
 
 
 def test_a_small_sphere_still_in_flight_over_a_large_bed_is_no_reason_to_refuse(
@@ -193,7 +193,7 @@ def test_a_small_sphere_still_in_flight_over_a_large_bed_is_no_reason_to_refuse(
 def test_two_spheres_that_overlap_too_deep_are_refused(
     settled_lattice: SimpleNamespace, share: float, accepted: bool
 ) -> None:
-    limit = overlap_limit(settled_lattice.spec, settled_lattice.cloud.radius)
+    limit = overlap_limit(settled_lattice.scene, settled_lattice.cloud.radius)
     top = int(np.argmax(settled_lattice.state.position[:, 2]))
     z = settled_lattice.state.position[top, 2] - share * limit * 40 * UM
     position = changed(settled_lattice.state.position, (top, 2), z)
@@ -275,7 +275,7 @@ def test_a_bed_too_shallow_is_refused(settled_lattice: SimpleNamespace) -> None:
             radius=state.radius[low],
             expected=int(low.sum()),
         ),
-        spec=settled_lattice.spec,
+        scene=settled_lattice.scene,
         cloud=dataclasses.replace(
             settled_lattice.cloud, position=settled_lattice.cloud.position[low], radius=state.radius[low]
         ),

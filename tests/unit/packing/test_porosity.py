@@ -240,10 +240,10 @@ def test_a_shallow_bed_says_by_how_much() -> None:
 # --- all of them at once -------------------------------------------------------------------------------------------
 
 
-def test_measuring_a_lattice(make_spec) -> None:
+def test_measuring_a_lattice(make_scene) -> None:
     position, radius = cubic(4, 8)
     packing = Packing(position * 40 * UM, radius * 40 * UM, 4 * 40 * UM)
-    found = measure(packing, make_spec(cohesion=50e3))
+    found = measure(packing, make_scene(cohesion=50e3))
     cubic_porosity = 1.0 - math.pi / 6.0
     assert found.interior == pytest.approx(cubic_porosity, abs=1e-12)
     assert found.from_floor == pytest.approx(cubic_porosity, abs=1e-12)
@@ -254,9 +254,9 @@ def test_measuring_a_lattice(make_spec) -> None:
     assert found.compaction == pytest.approx(3 * (1 - cubic_porosity) * overlap, rel=1e-10)
 
 
-def test_a_bed_lower_than_the_box_is_wide_counts_no_air_above_it(make_spec) -> None:
+def test_a_bed_lower_than_the_box_is_wide_counts_no_air_above_it(make_scene) -> None:
     position, radius = cubic(6, 4)
-    found = measure(Packing(position * UM, radius * UM, 6 * UM), make_spec())
+    found = measure(Packing(position * UM, radius * UM, 6 * UM), make_scene())
     assert found.from_floor == pytest.approx(1.0 - math.pi / 6.0, abs=1e-12)
     # the published count does: 4 of 6 layers
     assert found.paper_count == pytest.approx(1.0 - math.pi / 6.0 * 4 / 6, abs=1e-12)

@@ -10,13 +10,14 @@ from filtercake.crystals.csd import mixture
 from filtercake.packing.pack import MANIFEST, pack_replicates
 from filtercake.packing.replication import LEAST_REPLICATES, UntilNarrow
 from filtercake.packing.result import read_record
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
 from filtercake.run import console
 from filtercake.study.loading import load_study
 from filtercake.study.points import expand
 
-SPEC = PackingSpec(
+SCENE = Scene(
+    csd=mixture([20e-6, 30e-6], [0.5, 0.5]),
     particles=150,
     initial_void_fraction=0.6,
     settling_velocity=0.01,
@@ -32,7 +33,7 @@ SPEC = PackingSpec(
 
 
 def until(interval: float, values: np.ndarray, least: int = 1) -> UntilNarrow:
-    rule = UntilNarrow(SPEC, interval, least)
+    rule = UntilNarrow(SCENE, interval, least)
     for value in values:
         if rule.add(float(value)):
             break
@@ -69,12 +70,11 @@ def test_one_lucky_interval_is_not_enough() -> None:
 
 
 def test_replicates_are_added_and_kept(tmp_path) -> None:
-    csd = mixture([20e-6, 30e-6], [0.5, 0.5])
-    wide = pack_replicates(SPEC, csd, 40, tmp_path, "code", enough=UntilNarrow(SPEC, 0.05))
+    wide = pack_replicates(SCENE, 40, tmp_path, "code", enough=UntilNarrow(SCENE, 0.05))
     assert len(wide) == LEAST_REPLICATES
     made = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("r*.npz")}
-    rule = UntilNarrow(SPEC, 0.006)
-    narrow = pack_replicates(SPEC, csd, 40, tmp_path, "code", enough=rule)
+    rule = UntilNarrow(SCENE, 0.006)
+    narrow = pack_replicates(SCENE, 40, tmp_path, "code", enough=rule)
     assert LEAST_REPLICATES < len(narrow) < 40
     assert rule.half_width <= 0.006
     assert len(read_record(tmp_path / MANIFEST)["replicates"]) == len(narrow)
@@ -82,9 +82,8 @@ def test_replicates_are_added_and_kept(tmp_path) -> None:
 
 
 def test_the_search_is_bounded(tmp_path) -> None:
-    csd = mixture([20e-6, 30e-6], [0.5, 0.5])
-    rule = UntilNarrow(SPEC, 1e-4)
-    assert len(pack_replicates(SPEC, csd, 8, tmp_path, "code", enough=rule)) == 8
+    rule = UntilNarrow(SCENE, 1e-4)
+    assert len(pack_replicates(SCENE, 8, tmp_path, "code", enough=rule)) == 8
     assert rule.half_width > 1e-4
 
 
@@ -124,11 +123,11 @@ sweeps:
 """
     )
     broad, narrow = expand(load_study(path), lambda *_: "embedded")
-    assert (narrow.spec.particles, narrow.spec.bed_depth_factor) == (2000, 1.0)
+    assert (narrow.scene.particles, narrow.scene.bed_depth_factor) == (2000, 1.0)
     assert (broad.porosity_ci95_target, broad.replicates, broad.most_replicates) == (0.002, 4, 30)
     # 4.6 x 4.6 x 10 largest diameters at 70 % solids
     solids = 4.6 * 4.6 * 10 * 0.7 * 300e-6**3
     mean = 1.0 / (0.3 / 30e-6**3 + 0.7 / 300e-6**3) * np.pi / 6
-    assert broad.spec.particles == pytest.approx(solids / mean, rel=1e-3)
-    side = (broad.spec.particles * mean / (0.35 * 2 * broad.spec.bed_depth_factor)) ** (1 / 3)
+    assert broad.scene.particles == pytest.approx(solids / mean, rel=1e-3)
+    side = (broad.scene.particles * mean / (0.35 * 2 * broad.scene.bed_depth_factor)) ** (1 / 3)
     assert side == pytest.approx(4.6 * 300e-6, rel=1e-3)

@@ -104,9 +104,9 @@ def test_what_comes_after_rest_does_not_matter(record: list[tuple[float, float]]
 # --- scaling to a box ----------------------------------------------------------------------------------------------
 
 
-def test_the_rule_for_a_bed_by_hand(make_spec) -> None:
-    spec = make_spec(settling_velocity=0.01, time_step=0.3e-6, max_fall_times=4.0, porosity_tolerance=1e-4)
-    rule = StopRule.for_bed(spec, 282e-6)
+def test_the_rule_for_a_bed_by_hand(make_scene) -> None:
+    scene = make_scene(settling_velocity=0.01, time_step=0.3e-6, max_fall_times=4.0, porosity_tolerance=1e-4)
+    rule = StopRule.for_bed(scene, 282e-6)
     # from 2 L = 564 um at -0.01 m/s: (sqrt(1e-4 + 2*9.81*564e-6) - 0.01)/9.81 = 9.75 ms
     fall = (math.sqrt(1e-4 + 2 * 9.81 * 564e-6) - 0.01) / 9.81
     assert fall == pytest.approx(9.75e-3, rel=1e-3)
@@ -117,29 +117,29 @@ def test_the_rule_for_a_bed_by_hand(make_spec) -> None:
 
 
 @pytest.mark.parametrize("velocity", [0.0, 0.01])
-def test_the_free_fall_time_solves_the_fall(make_spec, velocity: float) -> None:
-    t = make_spec(settling_velocity=velocity).free_fall_time(1e-3)
+def test_the_free_fall_time_solves_the_fall(make_scene, velocity: float) -> None:
+    t = make_scene(settling_velocity=velocity).free_fall_time(1e-3)
     assert velocity * t + 0.5 * 9.81 * t**2 == pytest.approx(1e-3, rel=1e-12)
 
 
-def test_a_larger_box_gets_more_steps_between_checks_not_more_checks(make_spec) -> None:
-    spec = make_spec(settling_velocity=0.0)
-    small, large = StopRule.for_bed(spec, 200e-6), StopRule.for_bed(spec, 800e-6)
+def test_a_larger_box_gets_more_steps_between_checks_not_more_checks(make_scene) -> None:
+    scene = make_scene(settling_velocity=0.0)
+    small, large = StopRule.for_bed(scene, 200e-6), StopRule.for_bed(scene, 800e-6)
     # free fall from rest: time goes as sqrt(height)
     assert large.check_steps == pytest.approx(2 * small.check_steps, abs=1)
     assert large.max_checks == small.max_checks == CHECKS_PER_FALL * 4
     assert large.height_tolerance == small.height_tolerance
 
 
-def test_the_checks_cover_the_time_asked_for(make_spec) -> None:
-    spec = make_spec(max_fall_times=2.5)
-    rule = StopRule.for_bed(spec, 300e-6)
-    covered = rule.check_steps * rule.max_checks * spec.time_step
-    assert covered == pytest.approx(2.5 * spec.free_fall_time(600e-6), rel=0.5 / rule.check_steps + 0.01)
+def test_the_checks_cover_the_time_asked_for(make_scene) -> None:
+    scene = make_scene(max_fall_times=2.5)
+    rule = StopRule.for_bed(scene, 300e-6)
+    covered = rule.check_steps * rule.max_checks * scene.time_step
+    assert covered == pytest.approx(2.5 * scene.free_fall_time(600e-6), rel=0.5 / rule.check_steps + 0.01)
 
 
-def test_a_step_longer_than_a_check_still_runs(make_spec) -> None:
-    assert StopRule.for_bed(make_spec(time_step=1.0), 300e-6).check_steps == 1
+def test_a_step_longer_than_a_check_still_runs(make_scene) -> None:
+    assert StopRule.for_bed(make_scene(time_step=1.0), 300e-6).check_steps == 1
 
 
 # --- runs of fixed length ------------------------------------------------------------------------------------------

@@ -15,8 +15,10 @@ from test_calibration_figures import make as make_calibration
 from test_figures import POINTS
 from test_figures import make as make_study
 
-from filtercake.figures.calibrated import CALIBRATION_FIGURES, CalibrationData, with_interval
-from filtercake.figures.catalogue import FIGURES, StudyData, save
+from filtercake.figures.calibrated import CalibrationData, with_interval
+from filtercake.figures.catalogue import CALIBRATION_FIGURES, FIGURES
+from filtercake.figures.selection import StudyData
+from filtercake.figures.style import save
 from filtercake.report import captions, markdown, pages, words
 from filtercake.report.catalogue import PAGES
 from filtercake.study.loading import load_study

@@ -141,8 +141,8 @@ def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:
     printed = {"pmma_75_25": (0.392, 3.04e9), "pmma_50_50": (0.359, 3.06e9), "pmma_25_75": (0.358, 1.97e9)}
     rows = []
     for point in expand(pmma_study, lambda *_: "liggghts"):
-        porosity = printed[point.csd][0] if point.spec.cohesion == 50e3 and point.spec.friction == 0 else 0.5
-        if (point.spec.poisson_ratio, point.spec.restitution) != (0.2, 0.3):
+        porosity = printed[point.csd][0] if point.scene.cohesion == 50e3 and point.scene.friction == 0 else 0.5
+        if (point.scene.poisson_ratio, point.scene.restitution) != (0.2, 0.3):
             porosity = 0.6
         rows.append({**point.row(), "status": "ok", "porosity": porosity - 0.01, "porosity_paper_count": porosity})
     replicates = pd.DataFrame(rows)

@@ -14,10 +14,12 @@ from hypothesis import strategies as st
 
 from filtercake.errors import ConfigError, Problem
 from filtercake.packing.cloud import BedSize
+from filtercake.packing.scene import Scene
 from filtercake.study import engine_choice
 from filtercake.study.config.study import Study, Workflow
 from filtercake.study.loading import find_studies, load_studies, load_study, load_workflow, read_yaml
-from filtercake.study.points import bed_of, expand
+from filtercake.study.points import expand
+from filtercake.study.scenes import bed_of
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 
@@ -249,7 +251,7 @@ BROKEN: list[tuple[Any, ...]] = [
         "  - csd: bimodal\n    restitution: [0.3, 0.05]\npacking:\n  engine: liggghts",
         "sweeps[0].restitution[1]",
         "0.05",
-        "LIGGGHTS takes only more than 0.05; use engine: embedded",
+        "LIGGGHTS takes only more than 0.05; use engine: auto",
         id="restitution of LIGGGHTS",
     ),
     pytest.param(
@@ -674,22 +676,26 @@ def test_a_present_engine_is_no_problem(
     engine_choice.check([study_from(), study_from(with_packing(good_study, "engine: liggghts"))])
 
 
-def test_auto_needs_nothing_installed(nowhere: Path, study_from: Callable[..., Any], alum: Any, small_csd: Any) -> None:
+def test_auto_needs_nothing_installed(
+    nowhere: Path, study_from: Callable[..., Any], alum: Any, make_scene: Callable[..., Scene]
+) -> None:
     engine_choice.check([study_from()])
-    assert engine_choice.choose(small_csd, 2000, 0.3) == "embedded"
-    assert engine_choice.choose(alum(15)[1].csd, 100_000, 0.3) == "embedded"
+    assert engine_choice.choose(make_scene(particles=2000)) == "embedded"
+    assert engine_choice.choose(make_scene(csd=alum(15)[1].csd, particles=100_000)) == "embedded"
 
 
-def test_auto_takes_liggghts_where_it_is_installed_and_suits(nowhere: Path, alum: Any, small_csd: Any) -> None:
+def test_auto_takes_liggghts_where_it_is_installed_and_suits(
+    nowhere: Path, alum: Any, make_scene: Callable[..., Scene]
+) -> None:
     program = nowhere / "liggghts"
     program.write_text("#!/bin/sh\n", encoding="utf-8")
     program.chmod(0o755)
     wide = alum(15)[1].csd
-    assert engine_choice.choose(small_csd, 2000, 0.3) == "liggghts"
-    assert engine_choice.choose(small_csd, 100_000, 0.3) == "liggghts"  # narrow
-    assert engine_choice.choose(wide, 2000, 0.3) == "liggghts"  # small
-    assert engine_choice.choose(wide, 100_000, 0.3) == "embedded"
-    assert engine_choice.choose(small_csd, 2000, 0.05) == "embedded"  # LIGGGHTS does not take it
+    assert engine_choice.choose(make_scene(particles=2000)) == "liggghts"
+    assert engine_choice.choose(make_scene(particles=100_000)) == "liggghts"  # narrow
+    assert engine_choice.choose(make_scene(csd=wide, particles=2000)) == "liggghts"  # small
+    assert engine_choice.choose(make_scene(csd=wide, particles=100_000)) == "embedded"
+    assert engine_choice.choose(make_scene(particles=2000, restitution=0.05)) == "embedded"  # LIGGGHTS does not take it
 
 
 # --- a crystallizer ------------------------------------------------------------------------------------------------

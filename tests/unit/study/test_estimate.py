@@ -12,10 +12,8 @@ import pytest
 import yaml
 
 from filtercake.cli.commands import main
-from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.packing import contact_law
 from filtercake.packing.engines.base import LARGE_BED
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.study import limits
 from filtercake.study.estimate import (
     ACCURACY,
@@ -49,16 +47,13 @@ CASES = {
 }
 
 
-def scene(case: str, engine: str, particles: int) -> tuple[PackingSpec, CrystalSizeDistribution]:
+def scene_of(case: str, engine: str, particles: int) -> Scene:
     """A case of the benchmark at its default time step."""
     path, name, friction = CASES[case]
     study = load_study(REPOSITORY / path)
     point = next(point for point in expand(study, lambda *_: "embedded") if point.csd == name)
-    csd = study.csds[name].truncated
-    rayleigh = contact_law.rayleigh_time_step(0.5 * csd.smallest, point.spec.density, 5e6, 0.2)
-    step = limits.default_time_step(friction) * rayleigh
-    changes = {"engine": engine, "particles": particles, "friction": friction, "time_step": step, "cohesion": 50e3}
-    return dataclasses.replace(point.spec, **changes), csd
+    changes = {"engine": engine, "particles": particles, "friction": friction, "cohesion": 50e3}
+    return dataclasses.replace(point.scene, **changes).with_time_step(limits.default_time_step(friction))
 
 
 def measured() -> list[pytest.param]:
@@ -74,7 +69,7 @@ def measured() -> list[pytest.param]:
 
 @pytest.mark.parametrize(("case", "engine", "particles", "seconds"), measured())
 def test_a_packing_takes_what_was_measured(case: str, engine: str, particles: int, seconds: float) -> None:
-    assert 1.0 / ACCURACY < packing_seconds(*scene(case, engine, particles)) / seconds < ACCURACY
+    assert 1.0 / ACCURACY < packing_seconds(scene_of(case, engine, particles)) / seconds < ACCURACY
 
 
 def test_there_are_enough_measurements() -> None:
@@ -82,13 +77,12 @@ def test_there_are_enough_measurements() -> None:
 
 
 def test_growth_is_that_of_the_table() -> None:
-    spec, _ = scene("pmma", "embedded", 1000)
+    scene = scene_of("pmma", "embedded", 1000)
     for row in pd.read_csv(DATA / "growth.csv").to_dict("records"):
         csd = even_distribution(row["size_ratio"])
-        step = 0.5 * contact_law.rayleigh_time_step(0.5 * csd.smallest, spec.density, 5e6, 0.2)
-        made = dataclasses.replace(spec, particles=int(row["particles"]), time_step=step)
-        assert 1.0 / ACCURACY < packing_seconds(made, csd) / row["wall_s"] < ACCURACY, row
-        assert 1.0 / ACCURACY < fall_steps(made, csd) / row["steps"] < ACCURACY, row
+        made = dataclasses.replace(scene, csd=csd, particles=int(row["particles"])).with_time_step(0.5)
+        assert 1.0 / ACCURACY < packing_seconds(made) / row["wall_s"] < ACCURACY, row
+        assert 1.0 / ACCURACY < fall_steps(made) / row["steps"] < ACCURACY, row
 
 
 def test_steps_are_those_of_the_agreement_table() -> None:
@@ -98,88 +92,87 @@ def test_steps_are_those_of_the_agreement_table() -> None:
     compared = 0
     for point in expand(study, lambda *_: "embedded"):
         row = point.row()
-        same = (table["csd"] == point.csd) & (table["friction"] == point.spec.friction)
+        same = (table["csd"] == point.csd) & (table["friction"] == point.scene.friction)
         steps = table[same & (table["cohesion_kJ_m3"] == row["cohesion_kJ_m3"])]["steps"]
         if len(steps):
-            fraction = 0.36 if point.spec.friction == 0.0 else 0.2
-            csd = study.csds[point.csd].truncated
-            rayleigh = point.spec.time_step / point.spec.rayleigh_fraction(csd.smallest)
-            spec = dataclasses.replace(point.spec, time_step=fraction * rayleigh)
-            assert 1.0 / ACCURACY < fall_steps(spec, csd) / steps.mean() < ACCURACY, point.name
+            fraction = 0.36 if point.scene.friction == 0.0 else 0.2
+            assert 1.0 / ACCURACY < fall_steps(point.scene.with_time_step(fraction)) / steps.mean() < ACCURACY, (
+                point.name
+            )
             compared += 1
     assert compared >= 7
 
 
 @pytest.fixture
-def point_of(study_from: Callable[..., LoadedStudy]) -> Callable[..., tuple[Point, CrystalSizeDistribution]]:
-    """A point of the smallest study; keywords replace values of its spec."""
+def point_of(study_from: Callable[..., LoadedStudy]) -> Callable[..., Point]:
+    """A point of the smallest study; keywords replace values of its scene."""
     study = study_from()
     point = expand(study, lambda *_: "embedded")[0]
 
-    def make(replicates: int = 8, **changes: object) -> tuple[Point, CrystalSizeDistribution]:
-        spec = dataclasses.replace(point.spec, **changes)
-        return dataclasses.replace(point, spec=spec, replicates=replicates), study.csds[point.csd].truncated
+    def make(replicates: int = 8, **changes: object) -> Point:
+        scene = dataclasses.replace(point.scene, **changes)
+        return dataclasses.replace(point, scene=scene, replicates=replicates)
 
     return make
 
 
-def test_a_study_adds_up(point_of: Callable[..., tuple[Point, CrystalSizeDistribution]]) -> None:
-    point, csd = point_of()
-    found = estimate([point, point], {point.csd: csd})
+def test_a_study_adds_up(point_of: Callable[..., Point]) -> None:
+    point = point_of()
+    found = estimate([point, point])
     assert (found.points, found.packings) == (2, 16)
-    assert found.core_seconds == pytest.approx(2 * job_seconds(point, csd))
-    assert found.disk > 16 * 32 * point.spec.particles
+    assert found.core_seconds == pytest.approx(2 * job_seconds(point))
+    assert found.disk > 16 * 32 * point.scene.particles
     assert together([found, found]).core_seconds == 2 * found.core_seconds
-    assert estimate([point], {point.csd: csd}, on_cluster=True).core_seconds > found.core_seconds / 2
-    assert estimate([], {}) == Estimate(0.0, 0.0, 0.0, 0, 0)
+    assert estimate([point], on_cluster=True).core_seconds > found.core_seconds / 2
+    assert estimate([]) == Estimate(0.0, 0.0, 0.0, 0, 0)
 
 
 def test_wall_time_is_never_less_than_the_longest_job(
-    point_of: Callable[..., tuple[Point, CrystalSizeDistribution]],
+    point_of: Callable[..., Point],
 ) -> None:
-    point, csd = point_of()
-    found = estimate([point] * 10, {point.csd: csd})
+    point = point_of()
+    found = estimate([point] * 10)
     assert found.wall_seconds(2) == pytest.approx(found.core_seconds / 2)
     assert found.wall_seconds(1000) == found.longest
     assert "on 1000 cores" in found.words(1000) and "on 1 core," in found.words(1)
 
 
 def test_a_large_bed_takes_two_cores_for_half_the_time(
-    point_of: Callable[..., tuple[Point, CrystalSizeDistribution]],
+    point_of: Callable[..., Point],
 ) -> None:
-    large, csd = point_of(particles=LARGE_BED)
-    one, _ = point_of(particles=LARGE_BED, processes=1)
-    assert job_seconds(large, csd) < 0.6 * job_seconds(one, csd)
-    assert group_size(large, csd) == 1
+    large = point_of(particles=LARGE_BED)
+    one = point_of(particles=LARGE_BED, processes=1)
+    assert job_seconds(large) < 0.6 * job_seconds(one)
+    assert group_size(large) == 1
 
 
 def test_walltime_doubles_with_every_retry_and_has_an_end(
-    point_of: Callable[..., tuple[Point, CrystalSizeDistribution]],
+    point_of: Callable[..., Point],
 ) -> None:
-    point, csd = point_of(replicates=1000)
-    first = walltime_minutes(point, csd)
-    assert 60 * first > 4.0 * point.replicates * packing_seconds(point.spec, csd)
-    assert walltime_minutes(point, csd, 2) == 2 * first
-    assert walltime_minutes(point, csd, 30) == LONGEST_MINUTES
+    point = point_of(replicates=1000)
+    first = walltime_minutes(point)
+    assert 60 * first > 4.0 * point.replicates * packing_seconds(point.scene)
+    assert walltime_minutes(point, 2) == 2 * first
+    assert walltime_minutes(point, 30) == LONGEST_MINUTES
 
 
 def test_short_points_share_a_submission_and_long_ones_do_not(
-    point_of: Callable[..., tuple[Point, CrystalSizeDistribution]],
+    point_of: Callable[..., Point],
 ) -> None:
-    sizes = [group_size(*point_of(replicates=n)) for n in (1, 30, 1000)]
+    sizes = [group_size(point_of(replicates=n)) for n in (1, 30, 1000)]
     assert sizes == [GROUP_SIZES[0], GROUP_SIZES[1], 1]
 
 
 @pytest.mark.parametrize("granted", [5, 20, 60, 240])
 @pytest.mark.parametrize("replicates", [1, 30])
 def test_a_submission_asks_for_no_more_than_is_granted(
-    granted: int, replicates: int, point_of: Callable[..., tuple[Point, CrystalSizeDistribution]]
+    granted: int, replicates: int, point_of: Callable[..., Point]
 ) -> None:
-    point, csd = point_of(replicates=replicates)
-    size = group_size(point, csd, granted=granted)
-    whole = min(walltime_minutes(point, csd), granted)
+    point = point_of(replicates=replicates)
+    size = group_size(point, granted=granted)
+    whole = min(walltime_minutes(point), granted)
     for attempt in (1, 2, 3):
-        asked = walltime_minutes(point, csd, attempt, granted=granted)
+        asked = walltime_minutes(point, attempt, granted=granted)
         assert asked >= whole  # a smaller group is no reason for less time
         assert size * asked <= granted
 
@@ -190,9 +183,9 @@ def test_the_profile_knows_every_size_of_group() -> None:
 
 
 def test_an_interval_takes_as_many_packings_as_the_benchmark_found(
-    point_of: Callable[..., tuple[Point, CrystalSizeDistribution]],
+    point_of: Callable[..., Point],
 ) -> None:
-    point, _ = point_of()
+    point = point_of()
     found = pd.read_csv(DATA / "coverage.csv")["n"].mean()
     narrow = dataclasses.replace(point, replicates=1, porosity_ci95_target=0.002, max_replicates=64)
     assert packings_of(narrow) == pytest.approx(found, abs=1.5)
@@ -200,8 +193,8 @@ def test_an_interval_takes_as_many_packings_as_the_benchmark_found(
     assert packings_of(dataclasses.replace(narrow, porosity_ci95_target=0.1)) == 6
 
 
-def test_memory_grows_with_the_bed(point_of: Callable[..., tuple[Point, CrystalSizeDistribution]]) -> None:
-    assert BASE_MB < memory_mb(point_of()[0].spec) < memory_mb(point_of(particles=100_000)[0].spec)
+def test_memory_grows_with_the_bed(point_of: Callable[..., Point]) -> None:
+    assert BASE_MB < memory_mb(point_of().scene) < memory_mb(point_of(particles=100_000).scene)
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(5.0, "5 s"), (600.0, "10 min"), (7200.0, "2.0 h")])

@@ -6,20 +6,25 @@ from dataclasses import replace
 
 import pytest
 
-from filtercake.packing import contact_law
+from filtercake.crystals.csd import mixture
+from filtercake.packing.scene import Scene
 from filtercake.study import limits
 
-RAYLEIGH = contact_law.rayleigh_time_step(10e-6, 1180.0, 5e6, 0.2)
-SCENE = limits.Numbers(
-    smallest=20e-6,
+SCENE = Scene(
+    csd=mixture([20e-6, 50e-6], [0.5, 0.5]),
+    particles=2000,
+    initial_void_fraction=0.65,
+    settling_velocity=0.01,
     density=1180.0,
     youngs_modulus=5e6,
     poisson_ratio=0.2,
     restitution=0.3,
     friction=0.0,
     cohesion=50e3,
-    time_step=limits.FRICTIONLESS_TIME_STEP * RAYLEIGH,
-)
+    time_step=0.0,
+    engine="auto",
+).with_time_step(limits.FRICTIONLESS_TIME_STEP)
+RAYLEIGH = SCENE.rayleigh_time_step
 
 
 def test_the_papers_scene_passes_without_a_word() -> None:
@@ -30,7 +35,7 @@ def test_the_papers_scene_passes_without_a_word() -> None:
 
 def test_defaults_are_inside() -> None:
     for friction in (0.0, 0.05, 0.3, 1.0):
-        scene = replace(SCENE, friction=friction, time_step=limits.default_time_step(friction) * RAYLEIGH)
+        scene = replace(SCENE, friction=friction).with_time_step(limits.default_time_step(friction))
         assert limits.verdict(scene) == "allowed"
 
 
@@ -56,7 +61,7 @@ def test_restitution_too_small_for_liggghts_is_refused_with_that_engine_alone() 
     scene = replace(SCENE, restitution=0.05)
     (finding,) = limits.refusals(replace(scene, engine="liggghts"))
     assert finding.key == "restitution"
-    assert "engine: embedded" in finding.text and limits.PAGE in finding.text
+    assert "engine: auto" in finding.text and limits.PAGE in finding.text
     assert limits.verdict(replace(scene, engine="liggghts", restitution=0.051)) == "allowed"
     assert limits.verdict(replace(scene, engine="embedded")) == limits.verdict(scene) == "allowed"
 

@@ -22,7 +22,7 @@ from filtercake.filtration.resistance import carman_sauter, kozeny_carman
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed
 from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing, write_json
-from filtercake.packing.scene import PackingSpec, digest, stage_seed
+from filtercake.packing.scene import Scene, digest, stage_seed
 from filtercake.results.replicates import REPLICATE_COLUMNS, SUMMARY_COLUMNS, replicates_table, summarise
 from filtercake.study.loading import LoadedStudy
 from filtercake.study.points import POINT_COLUMNS, Point, expand, points_table
@@ -56,9 +56,9 @@ def points_of(study_from: Callable[..., LoadedStudy]) -> Callable[[str], list[Po
 def test_a_sweep_visits_every_combination(points_of) -> None:
     found = points_of("  - {csd: [a, b], cohesion_kJ_m3: [0, 50, 100], friction: [0, 0.1]}\n")
     assert len(found) == len({point.name for point in found}) == 12
-    visited = {(p.csd, p.spec.cohesion, p.spec.friction) for p in found}
+    visited = {(p.csd, p.scene.cohesion, p.scene.friction) for p in found}
     assert visited == {(c, s, mu) for c in "ab" for s in (0.0, 50e3, 100e3) for mu in (0.0, 0.1)}
-    assert {(p.spec.poisson_ratio, p.spec.restitution, p.spec.youngs_modulus) for p in found} == {(0.2, 0.3, 5e6)}
+    assert {(p.scene.poisson_ratio, p.scene.restitution, p.scene.youngs_modulus) for p in found} == {(0.2, 0.3, 5e6)}
 
 
 def test_sweeps_are_united_and_a_point_in_two_is_visited_once_with_the_more_replicates(points_of) -> None:
@@ -68,13 +68,13 @@ def test_sweeps_are_united_and_a_point_in_two_is_visited_once_with_the_more_repl
         "  - {csd: a, cohesion_kJ_m3: 0, replicates: 20}\n"
     )
     assert len(found) == 3
-    replicates = {(p.spec.cohesion, p.spec.poisson_ratio): p.replicates for p in found}
+    replicates = {(p.scene.cohesion, p.scene.poisson_ratio): p.replicates for p in found}
     assert replicates == {(0.0, 0.2): 20, (50e3, 0.2): 8, (50e3, 0.4): 3}
 
 
 def test_units_are_converted_once(points_of) -> None:
     (point,) = points_of("  - {csd: a, cohesion_kJ_m3: 15, youngs_modulus_MPa: 8}\n")
-    assert (point.spec.cohesion, point.spec.youngs_modulus) == (15e3, 8e6)
+    assert (point.scene.cohesion, point.scene.youngs_modulus) == (15e3, 8e6)
     row = point.row()
     assert (row["cohesion_kJ_m3"], row["youngs_modulus_MPa"]) == (15.0, 8.0)
     assert tuple(row) == POINT_COLUMNS
@@ -84,36 +84,36 @@ def test_the_time_step_follows_the_smallest_sphere_and_the_modulus(points_of) ->
     head = SWEEPS.replace("replicates: 3", "replicates: 3, time_step_rayleigh: 0.25")
     soft, stiff, coarse = points_of("  - {csd: a}\n  - {csd: a, youngs_modulus_MPa: 20}\n  - {csd: b}\n", head)
     # 20 um PMMA at 5 MPa: 0.8223 us
-    assert soft.spec.time_step == pytest.approx(0.25 * 0.8223e-6, rel=1e-4)
-    assert stiff.spec.time_step == pytest.approx(0.5 * soft.spec.time_step, rel=1e-12)
-    assert coarse.spec.time_step == pytest.approx(1.5 * soft.spec.time_step, rel=1e-12)
-    assert soft.spec.rayleigh_fraction(20 * UM) == pytest.approx(0.25, rel=1e-12)
+    assert soft.scene.time_step == pytest.approx(0.25 * 0.8223e-6, rel=1e-4)
+    assert stiff.scene.time_step == pytest.approx(0.5 * soft.scene.time_step, rel=1e-12)
+    assert coarse.scene.time_step == pytest.approx(1.5 * soft.scene.time_step, rel=1e-12)
+    assert soft.scene.rayleigh_fraction == pytest.approx(0.25, rel=1e-12)
 
 
 def test_a_time_step_in_us_overrides_the_share(points_of) -> None:
     head = SWEEPS.replace("replicates: 3", "replicates: 3, time_step_us: 0.1")
     (point,) = points_of("  - {csd: a}\n", head)
-    assert point.spec.time_step == pytest.approx(0.1e-6, rel=1e-14)
+    assert point.scene.time_step == pytest.approx(0.1e-6, rel=1e-14)
 
 
 def test_friction_shortens_the_default_step_and_nothing_else_does(points_of) -> None:
     without, some, more = points_of("  - {csd: a, friction: [0, 0.05, 0.5]}\n")
-    assert some.spec.time_step == more.spec.time_step < without.spec.time_step
-    assert without.spec.rayleigh_fraction(20 * UM) < 0.61  # stable in the prototype to 0.97
+    assert some.scene.time_step == more.scene.time_step < without.scene.time_step
+    assert without.scene.rayleigh_fraction < 0.61  # stable in the prototype to 0.97
 
 
 def test_auto_asks_for_an_engine(study_from) -> None:
     asked = []
 
-    def choose(csd: Any, particles: int, restitution: float) -> str:
-        asked.append((csd.size.tolist(), particles, restitution))
+    def choose(scene: Scene) -> str:
+        asked.append((scene.csd.size.tolist(), scene.particles, scene.restitution))
         return "some_engine"
 
     found = expand(study_from(SWEEPS + "  - {csd: [a, b], restitution: [0.3, 0.05]}\n"), choose)
-    assert [point.spec.engine for point in found] == ["some_engine"] * 4
+    assert [point.scene.engine for point in found] == ["some_engine"] * 4
     assert [rest for _, *rest in asked] == [[500, 0.3], [500, 0.05]] * 2
     named = SWEEPS.replace("replicates: 3", "replicates: 3, engine: liggghts_as_published")
-    assert expand(study_from(named + "  - {csd: a}\n"), choose)[0].spec.engine == "liggghts_as_published"
+    assert expand(study_from(named + "  - {csd: a}\n"), choose)[0].scene.engine == "liggghts_as_published"
 
 
 def test_a_point_survives_json(points_of) -> None:
@@ -224,30 +224,30 @@ def test_seeds_fit_a_signed_64_bit_integer(parts: list[Any]) -> None:
         {"skin": 1e-6},
     ],
 )
-def test_points_that_differ_in_the_contact_share_their_clouds(make_spec, pmma, change: dict[str, Any]) -> None:
-    assert cloud_seed(make_spec(**change), pmma(0.5), 3) == cloud_seed(make_spec(), pmma(0.5), 3)
+def test_points_that_differ_in_the_contact_share_their_clouds(make_scene, change: dict[str, Any]) -> None:
+    assert cloud_seed(make_scene(**change), 3) == cloud_seed(make_scene(), 3)
 
 
-def test_clouds_differ_by_replicate_distribution_number_void_fraction_and_base_seed(make_spec, pmma) -> None:
-    seeds = [cloud_seed(make_spec(), pmma(0.5), k) for k in range(100)]
-    seeds += [cloud_seed(make_spec(), pmma(0.25), k) for k in range(100)]
+def test_clouds_differ_by_replicate_distribution_number_void_fraction_and_base_seed(make_scene, pmma) -> None:
+    seeds = [cloud_seed(make_scene(csd=pmma(0.5)), k) for k in range(100)]
+    seeds += [cloud_seed(make_scene(csd=pmma(0.25)), k) for k in range(100)]
     seeds += [
-        cloud_seed(make_spec(**c), pmma(0.5), 0)
+        cloud_seed(make_scene(csd=pmma(0.5), **c), 0)
         for c in ({"particles": 301}, {"initial_void_fraction": 0.7}, {"seed": 2})
     ]
     assert len(set(seeds)) == 203
 
 
-def test_a_cloud_s_seed_outlives_a_csv_round_trip(make_spec, pmma, tmp_path: Path) -> None:
+def test_a_cloud_s_seed_outlives_a_csv_round_trip(make_scene, pmma, tmp_path: Path) -> None:
     csd = mixture([20.1 * UM, 33.3 * UM, 50 * UM], [1 / 3, 1 / 7, 1 - 1 / 3 - 1 / 7])
     to_table(csd, csd).to_csv(tmp_path / "csd.csv", index=False)
     _, again = from_table(pd.read_csv(tmp_path / "csd.csv"))
-    assert cloud_seed(make_spec(), again, 0) == cloud_seed(make_spec(), csd, 0)
+    assert cloud_seed(make_scene(csd=again), 0) == cloud_seed(make_scene(csd=csd), 0)
 
 
-def test_a_spec_survives_json(make_spec) -> None:
-    spec: PackingSpec = make_spec(time_step=1 / 3 * 1e-6)
-    assert PackingSpec.from_dict(json.loads(json.dumps(spec.as_dict()))) == spec
+def test_a_spec_survives_json(make_scene) -> None:
+    scene: Scene = make_scene(time_step=1 / 3 * 1e-6)
+    assert Scene.from_dict(json.loads(json.dumps(scene.as_dict()))) == scene
 
 
 # --- intervals -----------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
-from filtercake.validation.analytic_models import PEERS, farr_groot, initial_porosity, ouchiyama_tanaka, yu_zou_standish
+from filtercake.validation.analytic_models import PEERS, farr_groot, ouchiyama_tanaka, yu_zou_standish
 
 UM = 1e-6
 
@@ -205,28 +205,6 @@ def test_farr_groot_has_converged(pmma, alum_15_min: CrystalSizeDistribution, ro
         assert farr_groot(csd, rods) == pytest.approx(farr_groot(csd), abs=1e-4)
     wide = mixture([UM, 100 * UM], [0.27, 0.73])
     assert farr_groot(wide, rods) == pytest.approx(farr_groot(wide), abs=2e-4)
-
-
-def test_paper_eq_15() -> None:
-    assert initial_porosity(100 * UM, 0.05) == pytest.approx(0.375 + 0.34 * 0.002, rel=1e-12)
-    assert initial_porosity(20 * UM, 10.0) == pytest.approx(0.375, abs=1e-5)
-    assert initial_porosity(1.0, 1.0) < 1.0
-
-
-@pytest.mark.parametrize(
-    ("mean", "vessel", "says"),
-    [
-        (0.0, 1.0, "mean diameter 0 m is not positive"),
-        (math.nan, 1.0, "mean diameter nan"),
-        (1e-3, -1.0, "vessel diameter -1 m"),
-        (1e-3, math.inf, "vessel diameter inf"),
-        (0.2, 0.1, "spheres of 0.2 m do not fit in a vessel of 0.1 m"),
-    ],
-)
-def test_bad_diameters_are_refused(mean: float, vessel: float, says: str) -> None:
-    with pytest.raises(ValueError) as caught:
-        initial_porosity(mean, vessel)
-    assert says in str(caught.value)
 
 
 @pytest.mark.parametrize("eps0", [0.0, 1.0, -0.1, 37.5, math.nan, math.inf])

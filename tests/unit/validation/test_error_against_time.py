@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from filtercake.crystals.csd import mixture
-from filtercake.packing.scene import PackingSpec
+from filtercake.crystals.csd import mixture, truncate
+from filtercake.packing.scene import Scene
 from filtercake.study.loading import load_study
 from filtercake.study.points import base_point
 from filtercake.validation import error_against_time
@@ -25,7 +25,9 @@ from filtercake.validation.error_against_time import (
     variants,
 )
 
-SPEC = PackingSpec(
+CSD = mixture([20e-6, 50e-6], [0.5, 0.5])
+SCENE = Scene(
+    csd=CSD,
     particles=2000,
     initial_void_fraction=0.65,
     settling_velocity=0.01,
@@ -38,7 +40,6 @@ SPEC = PackingSpec(
     time_step=0.4e-6,
     engine="embedded",
 )
-CSD = mixture([20e-6, 50e-6], [0.5, 0.5])
 REFERENCE = Reference(0.35, 0.0)
 
 
@@ -126,8 +127,9 @@ def test_references_are_found_by_study_and_friction() -> None:
 
 @pytest.mark.parametrize("case", ["pmma", "pmma_friction", "alum", "alum_wide"])
 def test_variants_differ_from_the_default_in_what_they_say(case: str) -> None:
-    full = mixture(np.linspace(30e-6, 300e-6, 30), np.full(30, 1 / 30)) if "alum" in case else CSD
-    listed = variants(case, SPEC, full)
+    sizes = np.linspace(30e-6, 300e-6, 30)
+    full = mixture(sizes, sizes**3 / np.sum(sizes**3)) if "alum" in case else CSD
+    listed = variants(case, replace(SCENE, csd=truncate(full, 0.001).csd), full)
     default = listed[0]
     assert default.axis == "default"
     assert all(other.axis != "default" for other in listed[1:])
@@ -137,37 +139,39 @@ def test_variants_differ_from_the_default_in_what_they_say(case: str) -> None:
         "stop tolerance": {"porosity_tolerance"},
         "skin": {"skin"},
         "softer contacts": {"youngs_modulus", "cohesion", "time_step"},
-        "truncation": {"time_step"},
+        "truncation": {"time_step", "size", "volume_fraction"},
         "engine": set(),
         "as published": {"time_step", "skin"},
     }
     for variant in listed[1:]:
-        ours, theirs = (item.contender.spec.as_dict() for item in (variant, default))
+        ours, theirs = (item.contender.scene.as_dict() for item in (variant, default))
         differ = {key for key in ours if ours[key] != theirs[key]} - {"engine"}
         assert differ <= changed[variant.axis], variant
-        if variant.axis not in ("engine", "as published", "truncation"):
+        if variant.axis not in ("engine", "as published"):
             assert differ, variant
+        if "time_step" in differ and variant.axis not in ("time step", "as published"):
+            assert variant.contender.scene.rayleigh_fraction == pytest.approx(default.contender.scene.rayleigh_fraction)
 
 
 def test_softer_contacts_keep_the_sticking_speed() -> None:
-    for variant in variants("pmma", SPEC, CSD):
+    for variant in variants("pmma", SCENE, CSD):
         if variant.axis == "softer contacts":
-            spec = variant.contender.spec
-            ratio = (spec.cohesion / SPEC.cohesion) ** 5 / (spec.youngs_modulus / SPEC.youngs_modulus) ** 4
+            scene = variant.contender.scene
+            ratio = (scene.cohesion / SCENE.cohesion) ** 5 / (scene.youngs_modulus / SCENE.youngs_modulus) ** 4
             assert ratio == pytest.approx(1.0)  # v^2 = 37 s^5/(rho E*^4)
-            assert spec.rayleigh_fraction(20e-6) == pytest.approx(SPEC.rayleigh_fraction(20e-6))
+            assert scene.rayleigh_fraction == pytest.approx(SCENE.rayleigh_fraction)
 
 
 def test_a_quick_run_is_short() -> None:
-    full, quick = (variants("pmma", SPEC, CSD, quick=quick) for quick in (False, True))
+    full, quick = (variants("pmma", SCENE, CSD, quick=quick) for quick in (False, True))
     assert len(quick) < len(full)
     assert quick[0].axis == "default"
     assert sum(v.replicates for v in quick) < 0.3 * sum(v.replicates for v in full)
 
 
 def test_variants_are_settled_in_turn() -> None:
-    small = replace(SPEC, particles=150, initial_void_fraction=0.6)
-    maker = error_against_time._Maker(small, mixture([20e-6, 30e-6], [0.5, 0.5]))
+    small = replace(SCENE, csd=mixture([20e-6, 30e-6], [0.5, 0.5]), particles=150, initial_void_fraction=0.6)
+    maker = error_against_time._Maker(small, small.csd)
     lines: list[str] = []
     table = time_variants([maker.default(2), *maker.time_steps({0.3: 1})], lines.append)
     assert list(table["axis"]) == ["default", "time step", "default"]
@@ -186,7 +190,7 @@ def test_peers_take_milliseconds() -> None:
 
 
 def test_choices_stand_against_the_default() -> None:
-    listed = choices(SPEC, CSD, 4)
+    listed = choices(SCENE, 4)
     assert {item.choice for item in listed} >= {
         "drop height",
         "initial void fraction",
@@ -212,11 +216,11 @@ def test_choices_stand_against_the_default() -> None:
 
 def test_the_benchmarks_scenes_are_the_defaults() -> None:
     study = load_study(accuracy_study())
-    spec = base_point(study, "pmma_50_50", lambda *_: "embedded").spec
-    assert variants("pmma", spec, study.csds["pmma_50_50"].full)[0].contender.spec == replace(spec, processes=1)
-    frictional = base_point(study, "pmma_50_50", lambda *_: "embedded", friction=0.3).spec
+    scene = base_point(study, "pmma_50_50", lambda *_: "embedded").scene
+    assert variants("pmma", scene, study.csds["pmma_50_50"].full)[0].contender.scene == replace(scene, processes=1)
+    frictional = base_point(study, "pmma_50_50", lambda *_: "embedded", friction=0.3).scene
     assert frictional.friction == 0.3
-    assert math.isclose(frictional.rayleigh_fraction(20e-6), 0.2)
+    assert math.isclose(frictional.rayleigh_fraction, 0.2)
 
 
 def accuracy_study():

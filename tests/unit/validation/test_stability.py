@@ -10,26 +10,30 @@ import pytest
 
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.result import SettledState
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import Trajectory
 from filtercake.units import GRAVITY
 from filtercake.validation import stability
 from filtercake.validation.stability import (
     Case,
-    Scene,
     cases,
     distribution,
     energy_gain,
     momentum_drift,
     run,
-    spec_of,
+    scene_of,
     undetected,
 )
 
 ENGINES = ("embedded", "liggghts")
 
 
-def case(engine: str = "embedded", time_step: float = 0.0, **scene: float) -> Case:
-    return Case("test", engine, "time_step", time_step, "friction", 0.0, Scene(**scene), time_step=time_step)
+def case(x_name: str = "time_step", x: float = 0.0, y_name: str = "friction", y: float = 0.0) -> Case:
+    return Case("test", "embedded", x_name, x, y_name, y)
+
+
+def scene(**numbers: float) -> Scene:
+    return scene_of({**stability.BASE, **numbers}, "embedded")
 
 
 def test_there_are_enough_cases_and_no_two_are_the_same() -> None:
@@ -45,8 +49,8 @@ def test_without_liggghts_only_the_embedded_engine_is_stressed() -> None:
 
 
 def test_the_stress_reaches_as_far_as_asked() -> None:
-    scenes = [c.scene for c in cases(ENGINES)]
-    steps = [c.time_step for c in cases(ENGINES) if c.time_step]
+    scenes = [c.numbers for c in cases(ENGINES)]
+    steps = [numbers["time_step"] for numbers in scenes if numbers["time_step"]]
     assert (min(steps), max(steps)) == (0.02, 2.0)
     for name, low, high in (
         ("cohesion_kJ_m3", 0, 500),
@@ -56,9 +60,9 @@ def test_the_stress_reaches_as_far_as_asked() -> None:
         ("size_ratio", 1, 50),
         ("drop_height", 1, 10),
     ):
-        values = [getattr(scene, name) for scene in scenes]
+        values = [numbers[name] for numbers in scenes]
         assert (min(values), max(values)) == (low, high), name
-    assert max(scene.density_kg_m3 for scene in scenes) == 100 * 1180.0
+    assert max(numbers["density_kg_m3"] for numbers in scenes) == 100 * 1180.0
 
 
 @pytest.mark.parametrize("ratio", [1.0, 2.5, 5.0, 10.0, 20.0, 50.0])
@@ -71,7 +75,7 @@ def test_every_width_has_its_large_spheres(ratio: float) -> None:
 
 
 def test_a_higher_drop_is_a_faster_start() -> None:
-    low, high = (spec_of(case(drop_height=times))[0] for times in (1.0, 10.0))
+    low, high = (scene(drop_height=times) for times in (1.0, 10.0))
     cloud_height = (high.settling_velocity**2 - low.settling_velocity**2) / (2.0 * GRAVITY) / 9.0
     assert 4e-4 < cloud_height < 6e-4  # twice the box side of 1000 spheres, 0.22 mm
     assert high.max_fall_times == 10 * low.max_fall_times
@@ -79,7 +83,7 @@ def test_a_higher_drop_is_a_faster_start() -> None:
 
 def test_outcomes_of_a_safe_a_wild_and_a_refused_case(monkeypatch) -> None:
     monkeypatch.setattr(stability, "PARTICLES", 400)
-    table = run([case(), case(time_step=2.0), case(youngs_modulus_MPa=0.5, cohesion_kJ_m3=100.0)], replicates=2)
+    table = run([case(), case(x=2.0), case("youngs_modulus_MPa", 0.5, "cohesion_kJ_m3", 100.0)], replicates=2)
     safe, wild, soft = table.to_dict("records")
     assert safe["outcome"] in ("ok", "inaccurate")
     assert safe["n_accepted"] == 2
@@ -104,7 +108,7 @@ def test_what_never_rests_is_not_tried_for_ever(monkeypatch) -> None:
     monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("unsettled", "still moving"))
     row = stability._judge(case(), [0.35, 0.351], 10)
     assert (row["n"], row["n_accepted"], row["outcome"]) == (stability.HOPELESS, 0, "unsettled")
-    assert stability._reference(Scene(), 10) == []
+    assert stability._reference(scene(), 10) == []
 
 
 def test_a_bias_beyond_its_uncertainty_is_inaccurate(monkeypatch) -> None:
@@ -123,15 +127,15 @@ def state(height: list[float], energy: list[float], velocity: np.ndarray) -> Set
 
 
 def test_energy_that_appears_is_seen() -> None:
-    spec, _ = spec_of(case())
+    made = scene()
     cloud = Cloud(np.full((2, 3), 5e-5), np.full(2, 1e-5), 1e-4, 2e-4)
-    weight = 2 * spec.density * 4 / 3 * np.pi * 1e-15 * GRAVITY
+    weight = 2 * made.density * 4 / 3 * np.pi * 1e-15 * GRAVITY
     still = np.zeros((2, 3))
     falling = state([1e-4, 5e-5, 5e-5], [0.0, weight * 5e-5, 0.0], still)
-    assert energy_gain(falling, spec, cloud) == pytest.approx(0.0, abs=1e-12)
+    assert energy_gain(falling, made, cloud) == pytest.approx(0.0, abs=1e-12)
     fed = state([1e-4, 5e-5, 5e-5], [0.0, 0.0, weight * 2e-5], still)
-    assert energy_gain(fed, spec, cloud) == pytest.approx(0.2)
-    assert math.isinf(energy_gain(state([1e-4, math.nan], [0.0, 0.0], still), spec, cloud))
+    assert energy_gain(fed, made, cloud) == pytest.approx(0.2)
+    assert math.isinf(energy_gain(state([1e-4, math.nan], [0.0, 0.0], still), made, cloud))
 
 
 def test_sideways_drift_is_that_of_the_centre_of_mass() -> None:
@@ -141,7 +145,7 @@ def test_sideways_drift_is_that_of_the_centre_of_mass() -> None:
 
 
 def test_the_fence_knows_what_liggghts_does_not_take() -> None:
-    listed = [c for c in cases(ENGINES) if (c.family, c.scene.restitution, c.y) == ("restitution_time_step", 0.01, 0.5)]
+    listed = [c for c in cases(ENGINES) if (c.family, c.x, c.y) == ("restitution_time_step", 0.01, 0.5)]
     table = pd.DataFrame([{"family": c.family, "engine": c.engine, "x": c.x, "y": c.y} for c in listed])
     found = stability.with_fence(table)
     assert dict(zip(found["engine"], found["fence"], strict=True)) == {"embedded": "allowed", "liggghts": "refused"}

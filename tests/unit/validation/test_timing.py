@@ -9,12 +9,13 @@ import pandas as pd
 import pytest
 
 from filtercake.crystals.csd import mixture
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.validation.agreement import compare_engines
 from filtercake.validation.growth import Case, even_distribution, time_growth
 from filtercake.validation.timing import compare, contender, time_in_turn, warm_up
 
-SPEC = PackingSpec(
+SCENE = Scene(
+    csd=mixture([20e-6, 30e-6], [0.5, 0.5]),
     particles=150,
     initial_void_fraction=0.6,
     settling_velocity=0.01,
@@ -30,9 +31,8 @@ SPEC = PackingSpec(
 
 
 def test_beds_are_timed_and_measured() -> None:
-    csd = mixture([20e-6, 30e-6], [0.5, 0.5])
     lines: list[str] = []
-    table = time_in_turn([contender("embedded", SPEC)], csd, 2, lines.append)
+    table = time_in_turn([contender("embedded", SCENE)], 2, lines.append)
     assert list(table["replicate"]) == [0, 1]
     assert (table["wall_s"] > 0).all()
     assert (table["status"] == "ok").all()
@@ -43,9 +43,8 @@ def test_beds_are_timed_and_measured() -> None:
 @pytest.mark.parametrize("initial_void_fraction", [0.5, 0.65])
 def test_the_warm_up_finds_room_whatever_the_distribution(initial_void_fraction: float) -> None:
     for csd in (mixture([32e-6, 543e-6], [0.1, 0.9]), mixture([50e-6], [1.0])):
-        warm_up(
-            contender("embedded", replace(SPEC, initial_void_fraction=initial_void_fraction, particles=20_000)), csd
-        )
+        scene = replace(SCENE, csd=csd, initial_void_fraction=initial_void_fraction, particles=20_000)
+        warm_up(contender("embedded", scene))
 
 
 def test_ratios_and_intervals_of_made_up_timings() -> None:
@@ -99,7 +98,7 @@ def test_ensembles_agree_differ_or_say_nothing() -> None:
 
 def test_growth_is_timed_per_sphere_and_step() -> None:
     table = time_growth(
-        replace(SPEC, initial_void_fraction=0.65), [Case("particles", 150, 4.0), Case("size_ratio", 200, 2.0)]
+        replace(SCENE, initial_void_fraction=0.65), [Case("particles", 150, 4.0), Case("size_ratio", 200, 2.0)]
     )
     expected = 1e9 * table["wall_s"] / table["steps"] / table["particles"]
     assert table["ns_per_particle_step"].to_numpy() == pytest.approx(expected.to_numpy())

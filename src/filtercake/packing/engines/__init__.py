@@ -13,8 +13,19 @@ ENGINES: dict[str, type[Engine]] = {
     Embedded.name: Embedded,
     LiggghtsAsPublished.name: LiggghtsAsPublished,
 }
+"""In the order in which ``engine: auto`` prefers them."""
 
-__all__ = ["ENGINES", "Engine", "SettleRequest", "get_engine"]
+__all__ = ["ENGINES", "Engine", "SettleRequest", "get_engine", "kind_of", "label_of"]
+
+
+def kind_of(name: str) -> type[Engine]:
+    """Return an engine's class; the plain one, which starts from the cloud and stops by the rule, if not listed."""
+    return ENGINES.get(name, Engine)
+
+
+def label_of(name: str) -> str:
+    """Return an engine's name for readers; one that is not listed keeps its own."""
+    return ENGINES[name].label if name in ENGINES else name
 
 
 def get_engine(name: str) -> Engine:

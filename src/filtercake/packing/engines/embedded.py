@@ -13,10 +13,11 @@ from numba import get_num_threads, set_num_threads
 
 from filtercake import __version__
 from filtercake.errors import EngineError
-from filtercake.packing.engines.base import SettleRequest, parallelism
+from filtercake.packing.engines.base import Engine, SettleRequest, parallelism
 from filtercake.packing.engines.embedded_bed import Bed
 from filtercake.packing.pictures import write_vtk
 from filtercake.packing.result import SettledState, publish
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import TYPICAL_SOLIDS, Trajectory
 from filtercake.units import FloatArray
 
@@ -31,21 +32,25 @@ REST_AFTER_ARRIVAL = 1.2
 """Time at which a bed is at rest over that at which its last sphere arrives; for the forecast only."""
 
 
-class Embedded:
+class Embedded(Engine):
     """Numba kernels for the Hertz + SJKR contact law with optional friction, in double precision."""
 
     name = "embedded"
+    label = "embedded engine"
+    sphere_step = (21e-9, 38e-9)
+    compiles = True
 
-    def why_missing(self) -> str | None:
-        """Never missing: it comes with the package."""
-        return None
+    @classmethod
+    def suits(cls, scene: Scene) -> bool:  # noqa: ARG003
+        """Whether ``engine: auto`` may take it: always."""
+        return True
 
     def settle(self, request: SettleRequest) -> SettledState:
         """Let the cloud settle (see :class:`filtercake.packing.engines.base.Engine`)."""
-        threads = parallelism(request.spec)
+        threads = parallelism(request.scene)
         if threads > 1:
             set_num_threads(min(threads, get_num_threads()))
-        run = _Run(request, Bed.from_cloud(request.cloud, request.spec, threads))
+        run = _Run(request, Bed.from_cloud(request.cloud, request.scene, threads))
         run.resume()
         run.settle()
         position, velocity = run.bed.state()
@@ -83,7 +88,7 @@ class _Run:
         EngineError
             If the bed explodes, or at the time limit (transient: the saved state lets it go on).
         """
-        rule, spec = self.request.rule, self.request.spec
+        rule, scene = self.request.rule, self.request.scene
         while len(self.records) <= rule.max_checks and rule.settled_at(self.trajectory()) is None:
             self._picture()
             self.bed.advance(rule.check_steps)
@@ -97,9 +102,9 @@ class _Run:
                     "the bed exploded: positions are no longer finite; use a shorter time step", outcome="exploded"
                 )
             now = time.monotonic()
-            if 0.0 < spec.time_limit < now - self.started:
+            if 0.0 < scene.time_limit < now - self.started:
                 self._save()
-                limit = f"time limit of {spec.time_limit:g} s reached; the packing was stopped"
+                limit = f"time limit of {scene.time_limit:g} s reached; the packing was stopped"
                 raise EngineError(limit, transient=True, outcome="unsettled")
             if now - self.saved > STATE_SECONDS:
                 self._save()
@@ -125,7 +130,7 @@ class _Run:
                 records, before = data["records"], float(data["spent"])
                 self.bed.restore({name: data[name] for name in data.files})
         except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
-            self.bed = Bed.from_cloud(self.request.cloud, self.request.spec, self.bed.threads)
+            self.bed = Bed.from_cloud(self.request.cloud, self.request.scene, self.bed.threads)
             return
         self.records = [tuple(row) for row in records]
         self.before = before
@@ -141,7 +146,7 @@ class _Run:
 
     def _picture(self) -> None:
         check = len(self.records) - 1
-        if self.request.spec.write_vtk and check % CHECKS_PER_PICTURE == 0:
+        if self.request.scene.write_vtk and check % CHECKS_PER_PICTURE == 0:
             path: Path = self.request.folder / f"packing_{self.bed.step}.vtk"
             write_vtk(path, *self.bed.state(), self.request.cloud.radius)
 
@@ -155,7 +160,7 @@ class _Run:
         """Forecast from the pace so far and the spheres' free fall on a bed that rises with them."""
         bed, cloud = self.bed, self.request.cloud
         depth = (1.0 - cloud.void_fraction) * cloud.height / TYPICAL_SOLIDS
-        arrival = self.request.spec.free_fall_time(max(cloud.height - depth, 0.0)) / self.request.spec.time_step
+        arrival = self.request.scene.free_fall_time(max(cloud.height - depth, 0.0)) / self.request.scene.time_step
         steps = np.linspace(bed.step, max(REST_AFTER_ARRIVAL * arrival, 1.02 * bed.step), 101)
         down: FloatArray = np.minimum(
             1.0, np.array([bed.fallen(int(step)) for step in steps]) / bed.fallen(int(arrival))

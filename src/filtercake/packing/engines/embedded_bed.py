@@ -14,9 +14,9 @@ import numpy as np
 
 from filtercake.errors import EngineError
 from filtercake.packing import contact_law
-from filtercake.packing.cloud import Cloud
+from filtercake.packing.cloud import Cloud, size_levels
 from filtercake.packing.engines import embedded_kernels as kernels
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
 SKIN_DIAMETERS = (0.08, 1.5)
@@ -46,21 +46,21 @@ STATE_ARRAYS = (
     "spin",
     "floor_spring",
     "reference",
-    "bounds",
     *SIZED_ARRAYS,
 )
 STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step")
 
 
-def _no_pairs(spheres: int, capacity: int, frictional: bool) -> kernels.Pairs:
+def _no_pairs(threads: int, capacity: int, frictional: bool) -> kernels.Pairs:
     """Make an empty pair list with room for ``capacity`` pairs."""
     return kernels.Pairs(
-        first=np.zeros(spheres, dtype=np.uint64),
-        last=np.zeros(spheres, dtype=np.uint64),
+        bounds=np.zeros(threads + 1, dtype=np.int64),
+        first=np.empty(0, dtype=np.uint64),
+        last=np.empty(0, dtype=np.uint64),
         neighbour=np.empty(capacity, dtype=np.uint32),
         constants=np.empty((capacity, 2)),
         spring=np.zeros((capacity if frictional else 1, 3)),
-        near_last=np.zeros(spheres, dtype=np.uint64),
+        near_last=np.empty(0, dtype=np.uint64),
         near_neighbour=np.empty(capacity, dtype=np.uint32),
         near_constants=np.empty((capacity, 2)),
         near_pair=np.empty(capacity, dtype=np.uint32),
@@ -81,23 +81,23 @@ class Bed:
         velocity: FloatArray,
         radius: FloatArray,
         length: float,
-        spec: PackingSpec,
+        scene: Scene,
         gravity: float = GRAVITY,
         threads: int = 1,
     ):
         """Start from positions (n, 3) m, velocities (n, 3) m/s and radii (n,) m; every sphere is in the bed."""
         n = radius.size
         self.gravity, self.threads = gravity, threads
-        self.spec, self.length, self.total = spec, length, n
-        self.frictional = spec.friction > 0.0
-        self.spheres = np.column_stack([position, radius, velocity, spec.density * 4.0 / 3.0 * np.pi * radius**3])
+        self.scene, self.length, self.total = scene, length, n
+        self.frictional = scene.friction > 0.0
+        self.spheres = np.column_stack([position, radius, velocity, scene.density * 4.0 / 3.0 * np.pi * radius**3])
         self.position, self.velocity = self.spheres[:, :3], self.spheres[:, 4:7]
         self.radius, self.mass = self.spheres[:, 3], self.spheres[:, 7]
         self.spin = np.zeros((n, 3))
         self.touched = np.ones(n, dtype=np.bool_)
         self.identity = np.arange(n)
         self.floor_spring = np.zeros((n, 2))
-        self.level = np.floor(np.log2(radius.max() / radius) + 1e-12).astype(np.int64)
+        self.level = size_levels(radius)
         self.largest = np.array(
             [radius[self.level == k].max(initial=0.0) for k in range(int(self.level.max()) + 1)], dtype=np.float64
         )
@@ -107,26 +107,25 @@ class Bed:
         self._set_material()
         self.force = np.zeros((threads, n, 3))
         self.torque = np.zeros((threads, n if self.frictional else 1, 3))
-        self.bounds = np.zeros(threads + 1, dtype=np.int64)
         self.reference = np.zeros((n, 3))
         self.watched = np.empty(0, dtype=np.int64)
         self.grounded = np.empty(0, dtype=np.int64)
-        self.pairs = _no_pairs(0, 8 * n + 64 * threads, self.frictional)
+        self.pairs = _no_pairs(threads, 8 * n + 64 * threads, self.frictional)
         self.skin, self.frame_step = 0.0, 0.0
         self.count = n
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
         self.listed_at = 0  # step of the last listing
-        self.kernel = kernels.make_advance(spec.cohesion > 0.0, self.frictional, threads > 1)
+        self.kernel = kernels.make_advance(scene.cohesion > 0.0, self.frictional, threads > 1)
         self.find_pairs = kernels.make_find_pairs(threads > 1)
 
     @classmethod
-    def from_cloud(cls, cloud: Cloud, spec: PackingSpec, threads: int = 1) -> Bed:
+    def from_cloud(cls, cloud: Cloud, scene: Scene, threads: int = 1) -> Bed:
         """Start from a cloud of spheres falling together: all airborne."""
         order = np.argsort(cloud.position[:, 2] - cloud.radius, kind="stable")
         velocity = np.zeros_like(cloud.position)
-        velocity[:, 2] = -spec.settling_velocity
-        bed = cls(cloud.position[order], velocity, cloud.radius[order], cloud.length, spec, threads=threads)
+        velocity[:, 2] = -scene.settling_velocity
+        bed = cls(cloud.position[order], velocity, cloud.radius[order], cloud.length, scene, threads=threads)
         bed.identity = order
         bed.touched[:] = False
         bed.count = 0
@@ -134,16 +133,20 @@ class Bed:
         return bed
 
     def _set_material(self) -> None:
-        spec = self.spec
-        self.modulus = contact_law.effective_modulus(spec.youngs_modulus, spec.poisson_ratio)
-        shear = contact_law.shear_modulus(spec.youngs_modulus, spec.poisson_ratio) / (2.0 * (2.0 - spec.poisson_ratio))
-        self.damping_ratio = contact_law.damping_ratio(spec.restitution)
+        scene = self.scene
+        self.modulus = contact_law.effective_modulus(scene.youngs_modulus, scene.poisson_ratio)
+        shear = contact_law.shear_modulus(scene.youngs_modulus, scene.poisson_ratio) / (
+            2.0 * (2.0 - scene.poisson_ratio)
+        )
+        self.damping_ratio = contact_law.damping_ratio(scene.restitution)
         self.law = kernels.Law(
             float(self.gravity),
-            float(spec.cohesion),
-            float(spec.friction),
+            float(scene.cohesion),
+            float(scene.friction),
             6.0 * shear / self.modulus,  # 8 G* over 4/3 E*
             math.sqrt(4.0 * shear / self.modulus),  # root of 8 G* over 2 E*
+            float(self.length),
+            float(scene.time_step),
         )
         damping = 2.0 * math.sqrt(5.0 / 6.0) * self.damping_ratio
         root = np.sqrt(self.radius)
@@ -160,7 +163,7 @@ class Bed:
         return {**arrays, **pairs, "totals": totals, "numbers": numbers}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Go on from what :meth:`saved` returned for a bed of the same cloud, spec and number of threads.
+        """Go on from what :meth:`saved` returned for a bed of the same cloud, scene and number of threads.
 
         Raises
         ------
@@ -187,12 +190,12 @@ class Bed:
 
     def fallen(self, step: int) -> float:
         """Distance an airborne sphere has fallen after ``step`` steps, m."""
-        t = step * self.spec.time_step
-        return self.spec.settling_velocity * t + 0.5 * self.gravity * t * t
+        t = step * self.scene.time_step
+        return self.scene.settling_velocity * t + 0.5 * self.gravity * t * t
 
     def falling_speed(self, step: float) -> float:
         """Speed of an airborne sphere after ``step`` steps, m/s."""
-        return self.spec.settling_velocity + self.gravity * step * self.spec.time_step
+        return self.scene.settling_velocity + self.gravity * step * self.scene.time_step
 
     def advance(self, steps: int) -> None:
         """Advance by ``steps`` time steps; afterwards the forces at the positions are known."""
@@ -207,28 +210,11 @@ class Bed:
 
     def _run(self, steps: int) -> int:
         n = self.count
-        done, self.ready = self.kernel(
-            steps,
-            self.ready,
-            self.starting,
-            self.spheres[:n],
-            self.spin[:n],
-            self.force,
-            self.torque,
-            self.floor[:n],
-            self.floor_spring[:n],
-            self.pairs,
-            self.bounds,
-            self.reference[:n],
-            self.watched,
-            self.grounded,
-            self.law,
-            self.length,
-            self.spec.time_step,
-            self.skin,
-            self.frame_step * (self.step - self.listed_at),
-            self.frame_step,
-        )
+        moment = kernels.Moment(self.ready, self.starting, self.frame_step * (self.step - self.listed_at))
+        bodies = kernels.Bodies(self.spheres[:n], self.spin[:n], self.force, self.torque)
+        floor = kernels.Floor(self.floor[:n], self.floor_spring[:n], self.grounded)
+        listing = kernels.Listing(self.reference[:n], self.watched, self.skin, self.frame_step)
+        done, self.ready = self.kernel(steps, moment, bodies, floor, self.pairs, listing, self.law)
         self.starting = self.starting and done == 0
         self.listed = self.ready
         return int(done)
@@ -237,7 +223,7 @@ class Bed:
         """Wake the airborne spheres that the bed may reach, and list the pairs."""
         falling = not self.touched.all()
         # half way between what falls and what lies: neither moves more than half as much in this frame
-        self.frame_step = -0.5 * self.falling_speed(self.step) * self.spec.time_step if falling else 0.0
+        self.frame_step = -0.5 * self.falling_speed(self.step) * self.scene.time_step if falling else 0.0
         self.skin = self._choose_skin()
         self._mark_touched()
         while self._wake():  # what was woken may be about to meet the floor itself
@@ -257,9 +243,9 @@ class Bed:
 
     def _choose_skin(self) -> float:
         """Skin, m, that lasts ``LISTING_STEPS`` at the present speeds, within bounds set by the smallest size."""
-        if self.spec.skin > 0.0:
-            return self.spec.skin
-        n, step = self.count, self.spec.time_step
+        if self.scene.skin > 0.0:
+            return self.scene.skin
+        n, step = self.count, self.scene.time_step
         relative = self.velocity[:n].copy()
         relative[:, 2] -= self.frame_step / step
         speed = math.sqrt(float(np.einsum("ij,ij->i", relative, relative).max(initial=0.0)))
@@ -325,14 +311,18 @@ class Bed:
             )
         cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
         top = max(top, 0.0)
-        order = kernels.sort_in_space(self.spheres[:n], float(self.largest[0]), self.length, top)
+        # spheres of any size that are close in space, close in memory: by small cubes
+        cubes = self.largest[:1]
+        order = kernels.sort_into_cells(self.spheres[:n], np.zeros(n, dtype=np.int64), cubes, self.length, top)[0]
         for array in self._arrays():
             array[:n] = array[:n][order]
         spheres, level = self.spheres[:n], self.level[:n]
         index, start, shape, offset = kernels.sort_into_cells(spheres, level, cell_size, self.length, top)
         place = np.empty_like(index)
         place[index] = np.arange(n)
-        grid = kernels.Grid(spheres[index, :4], index, place, start, shape, offset, self.largest, cell_size)
+        grid = kernels.Grid(
+            self.length, level, spheres[index, :4], index, place, start, shape, offset, self.largest, cell_size
+        )
         pairs = self._find_pairs(grid)
         kernels.pair_constants(self.spheres[:n], pairs, self.modulus, self.damping_ratio)
         if self.frictional:
@@ -345,17 +335,15 @@ class Bed:
     def _find_pairs(self, grid: kernels.Grid) -> kernels.Pairs:
         n, capacity = self.count, self.pairs.neighbour.size
         # without springs to carry over, the old list's room serves again
-        pairs = _no_pairs(0, capacity, True) if self.frictional else self.pairs
+        pairs = _no_pairs(self.threads, capacity, True) if self.frictional else self.pairs
+        bounds = np.linspace(0, n, self.threads + 1).astype(np.int64)
         first, last = np.empty(n, dtype=np.uint64), np.empty(n, dtype=np.uint64)
-        self.bounds[:] = np.linspace(0, n, self.threads + 1).astype(np.int64)
-        spheres, level = self.spheres[:n], self.level[:n]
         while True:
-            count = self.find_pairs(
-                self.bounds, spheres, level, grid, self.length, self.skin, first, last, pairs.neighbour
-            )
+            pairs = pairs._replace(bounds=bounds, first=first, last=last)
+            count = self.find_pairs(self.spheres[:n], grid, self.skin, pairs)
             if count < pairs.neighbour.size // self.threads:
-                return pairs._replace(first=first, last=last, near_last=last.copy())
-            pairs = _no_pairs(0, int(1.3 * count) * self.threads, self.frictional)
+                return pairs._replace(near_last=last.copy())
+            pairs = _no_pairs(self.threads, int(1.3 * count) * self.threads, self.frictional)
 
     def _carry_springs(self, order: IntArray, pairs: kernels.Pairs) -> None:
         origin = np.where(order < self.pairs.first.size, order, -1)
@@ -365,8 +353,7 @@ class Bed:
         """Give every thread as many pairs as the others."""
         done = np.cumsum(self.pairs.last - self.pairs.first)
         shares = np.arange(1, self.threads) * (done[-1] / self.threads)
-        self.bounds[1:-1] = np.searchsorted(done, shares)
-        self.bounds[0], self.bounds[-1] = 0, self.count
+        self.pairs.bounds[1:-1] = np.searchsorted(done, shares)
 
     def _arrays(self) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.generic]], ...]:
         arrays = [self.spheres, self.floor, self.force[0], self.identity, self.level, self.touched]
@@ -376,7 +363,7 @@ class Bed:
         """Positions and full-step velocities in the engine's own order."""
         n = self.count
         position, velocity = self.position.copy(), self.velocity.copy()
-        half = 0.0 if self.starting else 0.5 * self.spec.time_step
+        half = 0.0 if self.starting else 0.5 * self.scene.time_step
         velocity[:n] += half * self.force[0, :n] / self.mass[:n, None]
         position[n:, 2] -= self.fallen(self.step)
         velocity[n:, 2] = -self.falling_speed(self.step)
@@ -394,7 +381,7 @@ class Bed:
         spin = self.spin.copy()
         if self.frictional and not self.starting:
             inertia = 0.4 * self.mass * self.radius**2
-            spin[: self.count] += (0.5 * self.spec.time_step * self.torque[0] / inertia[:, None])[: self.count]
+            spin[: self.count] += (0.5 * self.scene.time_step * self.torque[0] / inertia[:, None])[: self.count]
         return spin[np.argsort(self.identity)]
 
     def record(self) -> tuple[float, float, float, float]:
@@ -403,5 +390,5 @@ class Bed:
         height = float(np.average(position[:, 2], weights=self.mass))
         energy = float(0.5 * np.sum(self.mass * np.sum(velocity**2, axis=1)))
         sampled = (position[:, 2] >= 0.0) & (position[:, 2] <= self.length)
-        porosity = 1.0 - float(self.mass[sampled].sum()) / self.spec.density / self.length**3
-        return self.step * self.spec.time_step, height, energy, porosity
+        porosity = 1.0 - float(self.mass[sampled].sum()) / self.scene.density / self.length**3
+        return self.step * self.scene.time_step, height, energy, porosity

@@ -25,6 +25,10 @@ class Grid(NamedTuple):
 
     Attributes
     ----------
+    length : float
+        Side of the periodic box, m.
+    level : ndarray, shape (n,)
+        Size level of each sphere of the bed, 0 the coarsest.
     spheres : ndarray, shape (n, 4)
         Position and radius, sorted by level and cell.
     member : ndarray, shape (n,)
@@ -39,6 +43,8 @@ class Grid(NamedTuple):
         Largest radius and cell side of each level.
     """
 
+    length: float
+    level: IntArray
     spheres: FloatArray
     member: IntArray
     place: IntArray
@@ -54,6 +60,8 @@ class Pairs(NamedTuple):
 
     Attributes
     ----------
+    bounds : ndarray, shape (threads + 1,)
+        The spheres whose pairs each thread works on.
     first, last : ndarray, shape (n,)
         ``first[i]:last[i]`` are the pairs of sphere i.
     neighbour : ndarray, shape (m,)
@@ -70,6 +78,7 @@ class Pairs(NamedTuple):
         Which pair a near one is.
     """
 
+    bounds: IntArray
     first: Unsigned
     last: Unsigned
     neighbour: Neighbours
@@ -81,10 +90,94 @@ class Pairs(NamedTuple):
     near_pair: Neighbours
 
 
-class Law(NamedTuple):
-    """The contact law's numbers that are the same for all pairs, and gravity; SI.
+class Bodies(NamedTuple):
+    """The spheres in the bed and what acts on them.
 
-    ``shear_stiffness`` and ``shear_damping`` are the tangential constants over the normal ones.
+    Attributes
+    ----------
+    state : ndarray, shape (n, 8)
+        Position, radius, velocity and mass: one sphere is one cache line.
+    spin : ndarray, shape (n, 3)
+        Angular velocity, rad/s.
+    force, torque : ndarray, shape (threads, n, 3)
+        One layer per thread; the first ends as the total.
+    """
+
+    state: FloatArray
+    spin: FloatArray
+    force: FloatArray
+    torque: FloatArray
+
+
+class Floor(NamedTuple):
+    """The contacts with the floor.
+
+    Attributes
+    ----------
+    constants : ndarray, shape (n, 2)
+        As a pair's, of each sphere with the floor.
+    spring : ndarray, shape (n, 2)
+        Tangential springs, m.
+    grounded : ndarray, shape (m,)
+        The spheres that may touch the floor.
+    """
+
+    constants: FloatArray
+    spring: FloatArray
+    grounded: IntArray
+
+
+class Listing(NamedTuple):
+    """How far the spheres may move before the pairs are listed anew.
+
+    Attributes
+    ----------
+    reference : ndarray, shape (n, 3)
+        Positions at which the pairs were listed, m.
+    watched : ndarray, shape (m,)
+        Spheres that have neighbours which are not in the list.
+    skin : float
+        Gap up to which pairs are listed, m.
+    frame_step : float
+        What the frame in which movement is seen rises by per step, m: only relative movement opens or closes a pair.
+    """
+
+    reference: FloatArray
+    watched: IntArray
+    skin: float
+    frame_step: float
+
+
+class Moment(NamedTuple):
+    """Where the time loop stands.
+
+    Attributes
+    ----------
+    ready : bool
+        Whether the forces at the positions are known.
+    starting : bool
+        Whether the velocities are those of the positions, not yet half a step back.
+    frame : float
+        What the frame has risen by since the pairs were listed, m.
+    """
+
+    ready: bool
+    starting: bool
+    frame: float
+
+
+class Patches(NamedTuple):
+    """Vertical speed of every patch of spheres, and the speed relative to it that none may exceed, m/s."""
+
+    speed: FloatArray
+    limit: FloatArray
+
+
+class Law(NamedTuple):
+    """What of the equations of motion is the same for all spheres and steps; SI.
+
+    ``shear_stiffness`` and ``shear_damping`` are the tangential constants over the normal ones, ``length`` is the
+    side of the periodic box.
     """
 
     gravity: float
@@ -92,9 +185,11 @@ class Law(NamedTuple):
     friction: float
     shear_stiffness: float
     shear_damping: float
+    length: float
+    time_step: float
 
 
-# columns of the state: one sphere is one cache line
+# columns of the state
 X, Y, Z, RADIUS, U, V, W, MASS = range(8)
 
 NEAR_STEPS = 20
@@ -110,6 +205,10 @@ CLOSE_TO_LIMIT = 0.95
 FUSED = {"contract"}
 """Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
 
+_compiled = njit(cache=True, error_model="numpy", fastmath=FUSED)
+_inlined = njit(cache=True, error_model="numpy", fastmath=FUSED, forceinline=True)
+"""For what is told the kind of scene: inlined where the kind is a constant, it loses what this kind doesn't need."""
+
 # indices are unsigned: signed ones cost a test for negative values at every access
 IMAGE_SHIFT = np.uint32(28)
 INDEX_MASK = np.uint32(2**28 - 1)
@@ -120,31 +219,10 @@ SAME_IMAGE = np.uint32(4)
 STIFFNESS, DAMPING = range(2)
 
 
-@njit(cache=True)
-def sort_in_space(state: FloatArray, side: float, length: float, top: float) -> IntArray:
-    """Order in which spheres of any size that are close in space are close in memory: layers of rows of small cubes.
-
-    Parameters
-    ----------
-    state : ndarray, shape (n, 8)
-        Spheres; x and y in [0, length).
-    side : float
-        Side of the cubes.
-    length, top : float
-        Box side and greatest height of a centre.
-    """
-    n = state.shape[0]
-    across = max(1, int(length / side))
-    layers = max(1, int(top / side) + 1)
-    cell = np.empty(n, dtype=np.int64)
-    start = np.zeros(across * across * layers + 1, dtype=np.int64)
-    for i in range(n):
-        cx = min(int(state[i, X] / length * across), across - 1)
-        cy = min(int(state[i, Y] / length * across), across - 1)
-        cz = min(max(int(state[i, Z] / side), 0), layers - 1)
-        cell[i] = (cz * across + cy) * across + cx
-        start[cell[i] + 1] += 1
-    return _by_cell(cell, start)
+@njit(cache=True, error_model="numpy")
+def _layer(z: float, side: float, layers: int) -> int:
+    """Layer of cells that a height lies in."""
+    return min(max(int(z / side), 0), layers - 1)
 
 
 @njit(cache=True)
@@ -198,28 +276,18 @@ def sort_into_cells(
         across = shape[k, 0]
         cx = min(int(state[i, X] / length * across), across - 1)
         cy = min(int(state[i, Y] / length * across), across - 1)
-        cz = min(max(int(state[i, Z] / cell_size[k]), 0), shape[k, 2] - 1)
+        cz = _layer(state[i, Z], cell_size[k], shape[k, 2])
         cell[i] = offset[k] + (cz * across + cy) * across + cx
         start[cell[i] + 1] += 1
     return _by_cell(cell, start), start, shape, offset
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _find_pairs(
-    part: int,
-    bounds: IntArray,
-    state: FloatArray,
-    level: IntArray,
-    grid: Grid,
-    length: float,
-    skin: float,
-    first: Unsigned,
-    last: Unsigned,
-    neighbour: Neighbours,
-) -> int:
+@_compiled
+def _find_pairs(part: int, state: FloatArray, grid: Grid, skin: float, pairs: Pairs) -> int:
     """List the pairs of one part's spheres in its share of the list; return how many they are."""
-    spheres, member, place, start = grid.spheres, grid.member, grid.place, grid.start
-    shape, offset, largest, cell_size = grid.shape, grid.offset, grid.largest, grid.cell_size
+    bounds, first, last, neighbour = pairs.bounds, pairs.first, pairs.last, pairs.neighbour
+    level, spheres, member, place, start = grid.level, grid.spheres, grid.member, grid.place, grid.start
+    length, shape, offset, largest, cell_size = grid.length, grid.shape, grid.offset, grid.largest, grid.cell_size
     room = neighbour.size // (bounds.size - 1)
     begin_at, last_slot = part * room, room - 1
     count = 0
@@ -236,10 +304,9 @@ def _find_pairs(
             x1 = min(math.floor((x + reach) * inverse), 2 * across - 1)
             y0 = max(math.floor((y - reach) * inverse), -across)
             y1 = min(math.floor((y + reach) * inverse), 2 * across - 1)
-            z0 = min(max(math.floor((z - reach) / cell_size[k]), 0), layers - 1)
-            z1 = min(max(math.floor((z + reach) / cell_size[k]), 0), layers - 1)
-            if k == own:  # what lies in lower layers comes earlier and has listed the pair
-                z0 = min(max(int(z / cell_size[k]), 0), layers - 1)
+            # what lies in lower layers of the own level comes earlier and has listed the pair
+            z0 = _layer(z if k == own else z - reach, cell_size[k], layers)
+            z1 = _layer(z + reach, cell_size[k], layers)
             for cz in range(z0, z1 + 1):
                 for cy in range(y0, y1 + 1):
                     wrap_y = -1 if cy < 0 else (1 if cy >= across else 0)
@@ -268,27 +335,16 @@ def make_find_pairs(threaded: bool) -> Callable[..., int]:
     """Compile the search for pairs, for one thread or several."""
 
     @njit(cache=True, parallel=threaded)
-    def find_pairs(
-        bounds: IntArray,
-        state: FloatArray,
-        level: IntArray,
-        grid: Grid,
-        length: float,
-        skin: float,
-        first: Unsigned,
-        last: Unsigned,
-        neighbour: Neighbours,
-    ) -> int:
-        """List pairs closer than ``skin``, each once, by sphere (spheres sorted into cells).
+    def find_pairs(state: FloatArray, grid: Grid, skin: float, pairs: Pairs) -> int:
+        """List in ``pairs`` those closer than ``skin``, each once, by sphere (spheres sorted into cells).
 
-        ``first[i]:last[i]`` are sphere i's neighbours, the periodic image in the upper bits. The spheres
-        of part t, ``bounds[t]:bounds[t + 1]``, have the t-th share of the list to themselves. Returns the largest
-        number of pairs in one part: when it is more than a share holds, the list holds only a part of them.
+        Each part of the spheres (``pairs.bounds``) has an equal share of the list to itself. Returns the largest number
+        of pairs in one part: when it is more than a share holds, the list holds only a part of them.
         """
-        parts = bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
+        parts = pairs.bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
         counts = np.zeros(parts, dtype=np.int64)
         for t in prange(parts):
-            counts[t] = _find_pairs(t, bounds, state, level, grid, length, skin, first, last, neighbour)
+            counts[t] = _find_pairs(t, state, grid, skin, pairs)
         return int(counts.max())
 
     compiled: Callable[..., int] = find_pairs
@@ -332,9 +388,10 @@ def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
                         spring[p, k] = -old_spring[q, k]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _limit_speeds(state: FloatArray, patch_speed: FloatArray, patch_limit: FloatArray) -> None:
+@_compiled
+def _limit_speeds(state: FloatArray, patches: Patches) -> None:
     """Give every patch of spheres a vertical speed of its own, and the speed relative to it that none may exceed."""
+    patch_speed, patch_limit = patches.speed, patches.limit
     n = state.shape[0]
     fastest = 0.0
     for b in range(patch_speed.size):
@@ -354,21 +411,29 @@ def _limit_speeds(state: FloatArray, patch_speed: FloatArray, patch_limit: Float
         patch_limit[b] = OWN_ROOM * patch_limit[b] + COMMON_ROOM * fastest
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
-def _pick_near(
-    begin: int,
-    end: int,
-    state: FloatArray,
-    pairs: Pairs,
-    patch_speed: FloatArray,
-    patch_limit: FloatArray,
-    length: float,
-    duration: float,
-) -> None:
-    """Copy the pairs of spheres ``begin`` to ``end`` that may touch within ``duration`` (s) to the near ones."""
+@_compiled
+def _apart(
+    x: float, y: float, z: float, state: FloatArray, neighbour: int, length: float
+) -> tuple[Any, float, float, float]:
+    """Return a neighbour's number, and the way from its nearest image to a place."""
+    j = neighbour & INDEX_MASK
+    code = neighbour >> IMAGE_SHIFT
+    dx, dy, dz = x - state[j, X], y - state[j, Y], z - state[j, Z]
+    if code != SAME_IMAGE:
+        dx -= (np.int64(code) % 3 - 1) * length
+        dy -= (np.int64(code) // 3 - 1) * length
+    return j, dx, dy, dz
+
+
+@_compiled
+def _pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law: Law) -> None:
+    """Copy those of one part's pairs that may touch within ``NEAR_STEPS`` to the near ones."""
     first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
     near_last, near_neighbour = pairs.near_last, pairs.near_neighbour
     near_constants, near_pair = pairs.near_constants, pairs.near_pair
+    patch_speed, patch_limit = patches.speed, patches.limit
+    length, duration = law.length, NEAR_STEPS * law.time_step
+    begin, end = pairs.bounds[part], pairs.bounds[part + 1]
     if begin == end:
         return
     q = first[begin]
@@ -377,12 +442,7 @@ def _pick_near(
         own_speed = patch_speed[i // PATCH]
         r = state[i, RADIUS] + duration * patch_limit[i // PATCH]
         for p in range(first[i], last[i]):
-            j = neighbour[p] & INDEX_MASK
-            code = neighbour[p] >> IMAGE_SHIFT
-            dx, dy, dz = x - state[j, X], y - state[j, Y], z - state[j, Z]
-            if code != SAME_IMAGE:
-                dx -= (np.int64(code) % 3 - 1) * length
-                dy -= (np.int64(code) // 3 - 1) * length
+            j, dx, dy, dz = _apart(x, y, z, state, neighbour[p], length)
             patch = j >> PATCH_SHIFT
             approach = patch_limit[patch] + abs(own_speed - patch_speed[patch])
             touching = r + state[j, RADIUS] + duration * approach
@@ -396,7 +456,7 @@ def _pick_near(
         near_constants[k, DAMPING] = constants[near_pair[k], DAMPING]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
     """Return the largest distance from the reference in a frame that has risen by ``frame``, m."""
     farthest = 0.0
@@ -406,7 +466,7 @@ def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
     return math.sqrt(farthest)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FUSED)
+@_compiled
 def _limit_spring(
     hx: float, hy: float, hz: float, stiffness: float, allowed: float
 ) -> tuple[float, float, float, bool]:
@@ -418,212 +478,195 @@ def _limit_spring(
     return hx * ratio, hy * ratio, hz * ratio, True
 
 
-@cache
-def _make_pair_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
-    """Compile the forces between spheres for one kind of scene."""
+@njit(cache=True)
+def _share(part: int, bodies: Bodies) -> range:
+    """Return the spheres that one thread moves."""
+    parts, n = bodies.force.shape[0], bodies.state.shape[0]
+    return range(part * n // parts, (part + 1) * n // parts)
 
-    @njit(cache=True, error_model="numpy", fastmath=FUSED)
-    def pair_forces(
-        begin: int,
-        end: int,
-        state: FloatArray,
-        spin: FloatArray,
-        force: FloatArray,
-        torque: FloatArray,
-        pairs: Pairs,
-        law: Law,
-        length: float,
-        spring_step: float,
-    ) -> None:
-        """Add the forces and torques of the pairs of spheres ``begin`` to ``end``; ``force`` has shape (n, 3)."""
-        last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
-        spring, pair = pairs.spring, pairs.near_pair
-        lens_factor = 0.25 * math.pi * law.cohesion
-        stop = pairs.first[begin] if begin < end else np.uint64(0)
-        for i in range(begin, end):
-            start, stop = stop, last[i]
-            xi, yi, zi, ri = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
-            ui, vi, wi = state[i, U], state[i, V], state[i, W]
-            fx, fy, fz = 0.0, 0.0, 0.0
-            tx, ty, tz = 0.0, 0.0, 0.0
-            for q in range(start, stop):
-                j = neighbour[q] & INDEX_MASK
-                code = neighbour[q] >> IMAGE_SHIFT
-                dx, dy, dz = xi - state[j, X], yi - state[j, Y], zi - state[j, Z]
-                if code != SAME_IMAGE:
-                    dx -= (np.int64(code) % 3 - 1) * length
-                    dy -= (np.int64(code) // 3 - 1) * length
-                square = dx * dx + dy * dy + dz * dz
-                rj = state[j, RADIUS]
-                total = ri + rj
-                if square >= total * total:
-                    if frictional:
-                        spring[pair[q], 0] = spring[pair[q], 1] = spring[pair[q], 2] = 0.0
-                    continue
-                r = math.sqrt(square)
-                inverse = 1.0 / r
-                overlap = total - r
-                root = math.sqrt(overlap)
-                quarter = math.sqrt(root)
-                du, dv, dw = ui - state[j, U], vi - state[j, V], wi - state[j, W]
-                normal_speed = (du * dx + dv * dy + dw * dz) * inverse
-                normal = constants[q, STIFFNESS] * overlap * root - constants[q, DAMPING] * quarter * normal_speed
-                push = normal
-                if cohesive:
-                    lens = overlap * (total + r) * (square - (ri - rj) * (ri - rj))
-                    push -= lens_factor * lens * (inverse * inverse)
-                push *= inverse
-                gx, gy, gz = push * dx, push * dy, push * dz
+
+@njit(cache=True)
+def _clear(part: int, bodies: Bodies, gravity: float, frictional: bool) -> None:
+    """Set one layer of the forces and torques to nothing but, in the first, the spheres' weight."""
+    force, torque = bodies.force[part], bodies.torque[part]
+    for i in range(bodies.state.shape[0]):
+        force[i, 0] = force[i, 1] = 0.0
+        force[i, 2] = -gravity * bodies.state[i, MASS] if part == 0 else 0.0
+        if frictional:
+            torque[i, 0] = torque[i, 1] = torque[i, 2] = 0.0
+
+
+@njit(cache=True)
+def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
+    """Move the forces and torques on one part's spheres from the other layers to the first."""
+    force, torque = bodies.force, bodies.torque
+    for i in _share(part, bodies):
+        for other in range(1, force.shape[0]):
+            for k in range(3):
+                force[0, i, k] += force[other, i, k]
+                force[other, i, k] = 0.0
                 if frictional:
-                    nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
-                    arm_i, arm_j = ri - 0.5 * overlap, rj - 0.5 * overlap
-                    ox = arm_i * spin[i, 0] + arm_j * spin[j, 0]
-                    oy = arm_i * spin[i, 1] + arm_j * spin[j, 1]
-                    oz = arm_i * spin[i, 2] + arm_j * spin[j, 2]
-                    sx = du - normal_speed * nx - (nz * oy - ny * oz)
-                    sy = dv - normal_speed * ny - (nx * oz - nz * ox)
-                    sz = dw - normal_speed * nz - (ny * ox - nx * oy)
-                    hx = spring[pair[q], 0] + sx * spring_step
-                    hy = spring[pair[q], 1] + sy * spring_step
-                    hz = spring[pair[q], 2] + sz * spring_step
-                    along = hx * nx + hy * ny + hz * nz
-                    stiffness = law.shear_stiffness * constants[q, STIFFNESS] * root
-                    hx, hy, hz, slides = _limit_spring(
-                        hx - along * nx, hy - along * ny, hz - along * nz, stiffness, law.friction * abs(normal)
-                    )
-                    drag = 0.0 if slides else law.shear_damping * constants[q, DAMPING] * quarter
-                    px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
-                    spring[pair[q], 0], spring[pair[q], 1], spring[pair[q], 2] = hx, hy, hz
-                    gx += px
-                    gy += py
-                    gz += pz
-                    mx, my, mz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-                    tx -= arm_i * mx
-                    ty -= arm_i * my
-                    tz -= arm_i * mz
-                    torque[j, 0] -= arm_j * mx
-                    torque[j, 1] -= arm_j * my
-                    torque[j, 2] -= arm_j * mz
-                fx += gx
-                fy += gy
-                fz += gz
-                force[j, 0] -= gx
-                force[j, 1] -= gy
-                force[j, 2] -= gz
-            force[i, 0] += fx
-            force[i, 1] += fy
-            force[i, 2] += fz
-            if frictional:
-                torque[i, 0] += tx
-                torque[i, 1] += ty
-                torque[i, 2] += tz
-
-    compiled: Callable[..., None] = pair_forces
-    return compiled
+                    torque[0, i, k] += torque[other, i, k]
+                    torque[other, i, k] = 0.0
 
 
-@cache
-def _make_floor_forces(cohesive: bool, frictional: bool) -> Callable[..., None]:
-    """Compile the forces of the floor for one kind of scene."""
-
-    @njit(cache=True, error_model="numpy", fastmath=FUSED)
-    def floor_forces(
-        grounded: IntArray,
-        state: FloatArray,
-        spin: FloatArray,
-        force: FloatArray,
-        torque: FloatArray,
-        floor: FloatArray,
-        floor_spring: FloatArray,
-        law: Law,
-        spring_step: float,
-    ) -> None:
-        """Add the floor's forces and torques on the spheres listed in ``grounded``."""
-        for k in range(grounded.size):
-            i = grounded[k]
-            z, radius = state[i, Z], state[i, RADIUS]
-            overlap = radius - z
-            if overlap <= 0.0:
+@_inlined
+def _pair_forces(
+    part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, cohesive: bool, frictional: bool
+) -> None:
+    """Add the forces and torques of the pairs of one part's spheres to its layers."""
+    state, spin, force, torque = bodies.state, bodies.spin, bodies.force[part], bodies.torque[part]
+    last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
+    spring, pair, length = pairs.spring, pairs.near_pair, law.length
+    lens_factor = 0.25 * math.pi * law.cohesion
+    begin, end = pairs.bounds[part], pairs.bounds[part + 1]
+    stop = pairs.first[begin] if begin < end else np.uint64(0)
+    for i in range(begin, end):
+        start, stop = stop, last[i]
+        xi, yi, zi, ri = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
+        ui, vi, wi = state[i, U], state[i, V], state[i, W]
+        fx, fy, fz = 0.0, 0.0, 0.0
+        tx, ty, tz = 0.0, 0.0, 0.0
+        for q in range(start, stop):
+            j, dx, dy, dz = _apart(xi, yi, zi, state, neighbour[q], length)
+            square = dx * dx + dy * dy + dz * dz
+            rj = state[j, RADIUS]
+            total = ri + rj
+            if square >= total * total:
                 if frictional:
-                    floor_spring[i, 0] = floor_spring[i, 1] = 0.0
+                    spring[pair[q], 0] = spring[pair[q], 1] = spring[pair[q], 2] = 0.0
                 continue
+            r = math.sqrt(square)
+            inverse = 1.0 / r
+            overlap = total - r
             root = math.sqrt(overlap)
             quarter = math.sqrt(root)
-            normal = floor[i, STIFFNESS] * overlap * root - floor[i, DAMPING] * quarter * state[i, W]
-            force[i, 2] += normal
+            du, dv, dw = ui - state[j, U], vi - state[j, V], wi - state[j, W]
+            normal_speed = (du * dx + dv * dy + dw * dz) * inverse
+            normal = constants[q, STIFFNESS] * overlap * root - constants[q, DAMPING] * quarter * normal_speed
+            push = normal
             if cohesive:
-                force[i, 2] -= math.pi * law.cohesion * overlap * (radius + z)
+                lens = overlap * (total + r) * (square - (ri - rj) * (ri - rj))
+                push -= lens_factor * lens * (inverse * inverse)
+            push *= inverse
+            gx, gy, gz = push * dx, push * dy, push * dz
             if frictional:
-                arm = z + 0.5 * overlap
-                sx, sy = state[i, U] - arm * spin[i, 1], state[i, V] + arm * spin[i, 0]
-                stiffness = law.shear_stiffness * floor[i, STIFFNESS] * root
-                hx, hy, _, slides = _limit_spring(
-                    floor_spring[i, 0] + sx * spring_step,
-                    floor_spring[i, 1] + sy * spring_step,
-                    0.0,
-                    stiffness,
-                    law.friction * abs(normal),
+                nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
+                arm_i, arm_j = ri - 0.5 * overlap, rj - 0.5 * overlap
+                ox = arm_i * spin[i, 0] + arm_j * spin[j, 0]
+                oy = arm_i * spin[i, 1] + arm_j * spin[j, 1]
+                oz = arm_i * spin[i, 2] + arm_j * spin[j, 2]
+                sx = du - normal_speed * nx - (nz * oy - ny * oz)
+                sy = dv - normal_speed * ny - (nx * oz - nz * ox)
+                sz = dw - normal_speed * nz - (ny * ox - nx * oy)
+                hx = spring[pair[q], 0] + sx * spring_step
+                hy = spring[pair[q], 1] + sy * spring_step
+                hz = spring[pair[q], 2] + sz * spring_step
+                along = hx * nx + hy * ny + hz * nz
+                stiffness = law.shear_stiffness * constants[q, STIFFNESS] * root
+                hx, hy, hz, slides = _limit_spring(
+                    hx - along * nx, hy - along * ny, hz - along * nz, stiffness, law.friction * abs(normal)
                 )
-                drag = 0.0 if slides else law.shear_damping * floor[i, DAMPING] * quarter
-                px, py = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy
-                floor_spring[i, 0], floor_spring[i, 1] = hx, hy
-                force[i, 0] += px
-                force[i, 1] += py
-                torque[i, 0] += arm * py
-                torque[i, 1] -= arm * px
+                drag = 0.0 if slides else law.shear_damping * constants[q, DAMPING] * quarter
+                px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
+                spring[pair[q], 0], spring[pair[q], 1], spring[pair[q], 2] = hx, hy, hz
+                gx += px
+                gy += py
+                gz += pz
+                mx, my, mz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
+                tx -= arm_i * mx
+                ty -= arm_i * my
+                tz -= arm_i * mz
+                torque[j, 0] -= arm_j * mx
+                torque[j, 1] -= arm_j * my
+                torque[j, 2] -= arm_j * mz
+            fx += gx
+            fy += gy
+            fz += gz
+            force[j, 0] -= gx
+            force[j, 1] -= gy
+            force[j, 2] -= gz
+        force[i, 0] += fx
+        force[i, 1] += fy
+        force[i, 2] += fz
+        if frictional:
+            torque[i, 0] += tx
+            torque[i, 1] += ty
+            torque[i, 2] += tz
 
-    compiled: Callable[..., None] = floor_forces
-    return compiled
 
-
-@cache
-def _make_move(frictional: bool) -> Callable[..., tuple[float, bool]]:
-    """Compile one step of the equations of motion."""
-
-    @njit(cache=True, error_model="numpy", fastmath=FUSED)
-    def move(
-        begin: int,
-        end: int,
-        state: FloatArray,
-        spin: FloatArray,
-        force: FloatArray,
-        torque: FloatArray,
-        patch_speed: FloatArray,
-        patch_limit: FloatArray,
-        kick: float,
-        time_step: float,
-        frame_speed: float,
-        gravity: float,
-    ) -> tuple[float, bool]:
-        """Kick and move spheres ``begin`` to ``end``, and leave their weight in ``force`` for the next step to add to.
-
-        Returns the largest squared speed in the frame, and whether a sphere was faster than its patch may be.
-        """
-        fastest, too_fast = 0.0, False
-        for i in range(begin, end):
-            patch = i // PATCH
-            scale = kick / state[i, MASS]
-            u = state[i, U] + scale * force[i, 0]
-            v = state[i, V] + scale * force[i, 1]
-            w = state[i, W] + scale * force[i, 2]
-            state[i, U], state[i, V], state[i, W] = u, v, w
-            state[i, X] += time_step * u
-            state[i, Y] += time_step * v
-            state[i, Z] += time_step * w
-            force[i, 0], force[i, 1], force[i, 2] = 0.0, 0.0, -gravity * state[i, MASS]
+@_inlined
+def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, cohesive: bool, frictional: bool) -> None:
+    """Add the floor's forces and torques to the total."""
+    state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
+    constants, spring, grounded = floor.constants, floor.spring, floor.grounded
+    for k in range(grounded.size):
+        i = grounded[k]
+        z, radius = state[i, Z], state[i, RADIUS]
+        overlap = radius - z
+        if overlap <= 0.0:
             if frictional:
-                turn = scale / (0.4 * state[i, RADIUS] * state[i, RADIUS])
-                for k in range(3):
-                    spin[i, k] += turn * torque[i, k]
-                    torque[i, k] = 0.0
-            sideways = u * u + v * v
-            rising, own = w - frame_speed, w - patch_speed[patch]
-            fastest = max(fastest, sideways + rising * rising)
-            too_fast |= sideways + own * own > patch_limit[patch] * patch_limit[patch]
-        return fastest, too_fast
+                spring[i, 0] = spring[i, 1] = 0.0
+            continue
+        root = math.sqrt(overlap)
+        quarter = math.sqrt(root)
+        normal = constants[i, STIFFNESS] * overlap * root - constants[i, DAMPING] * quarter * state[i, W]
+        force[i, 2] += normal
+        if cohesive:
+            force[i, 2] -= math.pi * law.cohesion * overlap * (radius + z)
+        if frictional:
+            arm = z + 0.5 * overlap
+            sx, sy = state[i, U] - arm * spin[i, 1], state[i, V] + arm * spin[i, 0]
+            stiffness = law.shear_stiffness * constants[i, STIFFNESS] * root
+            hx, hy, _, slides = _limit_spring(
+                spring[i, 0] + sx * spring_step,
+                spring[i, 1] + sy * spring_step,
+                0.0,
+                stiffness,
+                law.friction * abs(normal),
+            )
+            drag = 0.0 if slides else law.shear_damping * constants[i, DAMPING] * quarter
+            px, py = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy
+            spring[i, 0], spring[i, 1] = hx, hy
+            force[i, 0] += px
+            force[i, 1] += py
+            torque[i, 0] += arm * py
+            torque[i, 1] -= arm * px
 
-    compiled: Callable[..., tuple[float, bool]] = move
-    return compiled
+
+@_inlined
+def _move(
+    part: int, bodies: Bodies, patches: Patches, kick: float, frame_speed: float, law: Law, frictional: bool
+) -> tuple[float, bool]:
+    """Kick and move one part's spheres, and leave their weight in the total force for the next step to add to.
+
+    ``kick`` is the time, s, that the force has acted. Returns the largest squared speed in the frame, and whether
+    a sphere was faster than its patch may be.
+    """
+    state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
+    gravity, time_step = law.gravity, law.time_step
+    fastest, too_fast = 0.0, False
+    for i in _share(part, bodies):
+        patch = i // PATCH
+        scale = kick / state[i, MASS]
+        u = state[i, U] + scale * force[i, 0]
+        v = state[i, V] + scale * force[i, 1]
+        w = state[i, W] + scale * force[i, 2]
+        state[i, U], state[i, V], state[i, W] = u, v, w
+        state[i, X] += time_step * u
+        state[i, Y] += time_step * v
+        state[i, Z] += time_step * w
+        force[i, 0], force[i, 1], force[i, 2] = 0.0, 0.0, -gravity * state[i, MASS]
+        if frictional:
+            turn = scale / (0.4 * state[i, RADIUS] * state[i, RADIUS])
+            for k in range(3):
+                spin[i, k] += turn * torque[i, k]
+                torque[i, k] = 0.0
+        sideways = u * u + v * v
+        rising, own = w - frame_speed, w - patches.speed[patch]
+        fastest = max(fastest, sideways + rising * rising)
+        too_fast |= sideways + own * own > patches.limit[patch] * patches.limit[patch]
+    return fastest, too_fast
 
 
 @njit(cache=True)
@@ -639,122 +682,67 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
-    A threaded loop gives each thread a share of the pairs and a force buffer of its own.
+    The kind is all that is bound here: numba finds a function that binds compiled ones in no cache. A threaded loop
+    gives each thread a share of the pairs and a force buffer of its own.
     """
-    pair_forces = _make_pair_forces(cohesive, frictional)
-    floor_forces = _make_floor_forces(cohesive, frictional)
-    move = _make_move(frictional)
 
     @njit(cache=True, error_model="numpy", fastmath=FUSED, parallel=threaded)
     def advance(
-        steps: int,
-        ready: bool,
-        starting: bool,
-        state: FloatArray,
-        spin: FloatArray,
-        force: FloatArray,
-        torque: FloatArray,
-        floor: FloatArray,
-        floor_spring: FloatArray,
-        pairs: Pairs,
-        bounds: IntArray,
-        reference: FloatArray,
-        watched: IntArray,
-        grounded: IntArray,
-        law: Law,
-        length: float,
-        time_step: float,
-        skin: float,
-        frame: float,
-        frame_step: float,
+        steps: int, moment: Moment, bodies: Bodies, floor: Floor, pairs: Pairs, listing: Listing, law: Law
     ) -> tuple[int, bool]:
         """Advance up to ``steps``.
 
-        It stops early, forces unknown, when a sphere may have moved by half a skin since the pairs were listed (at
-        ``reference``; real distances are taken only when the sum of the largest speeds says so), or when
-        one of the ``watched`` spheres, which have neighbours that are not in the list, has been touched. Movement
-        is seen from a frame that has risen by ``frame`` and rises by ``frame_step`` per step: only relative
-        movement opens or closes a pair.
-
-        ``force`` and ``torque`` have one layer per thread, shape (threads, n, 3); the first ends as the total.
-        ``bounds`` (threads + 1,) are the spheres whose pairs each thread works on, ``grounded`` the spheres that
-        may touch the floor.
+        It stops early, forces unknown, when a sphere may have moved by half a skin since the pairs were listed (real
+        distances are taken only when the sum of the largest speeds says so), or when one of the ``watched`` spheres
+        has been touched.
 
         Returns
         -------
         Steps done, and whether the forces at the new positions are known.
         """
-        n = state.shape[0]
-        parts = bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
-        done = 0
-        limit = 0.5 * skin
-        drift, speed, too_fast = _farthest(state, reference, frame), np.zeros(parts), np.zeros(parts, dtype=np.bool_)
-        patches = (n + PATCH - 1) // PATCH
-        patch_speed, patch_limit = np.zeros(patches), np.full(patches, np.inf)
-        picked = 0  # steps that the choice of near pairs will last yet
-        near_enough = True
-        frame_speed = frame_step / time_step
+        ready, starting, frame = moment
+        state = bodies.state
+        parts = pairs.bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
+        limit, time_step = 0.5 * listing.skin, law.time_step
+        frame_speed = listing.frame_step / time_step
+        drift, near_enough = _farthest(state, listing.reference, frame), True
+        speed, too_fast = np.zeros(parts), np.zeros(parts, dtype=np.bool_)
+        count = (state.shape[0] + PATCH - 1) // PATCH
+        patches = Patches(np.zeros(count), np.full(count, np.inf))
+        done, picked = 0, 0  # picked: steps that the choice of near pairs will last yet
         if not ready:
             for t in prange(parts):
-                for i in range(n):
-                    force[t, i, 0] = force[t, i, 1] = 0.0
-                    force[t, i, 2] = -law.gravity * state[i, MASS] if t == 0 else 0.0
-                    if frictional:
-                        torque[t, i, 0] = torque[t, i, 1] = torque[t, i, 2] = 0.0
+                _clear(t, bodies, law.gravity, frictional)
         while True:
             if not ready:
                 if picked == 0:
-                    _limit_speeds(state, patch_speed, patch_limit)
-                    duration = NEAR_STEPS * time_step
-                    for t in prange(parts):
-                        _pick_near(bounds[t], bounds[t + 1], state, pairs, patch_speed, patch_limit, length, duration)
                     picked = NEAR_STEPS
+                    _limit_speeds(state, patches)
+                    for t in prange(parts):
+                        _pick_near(t, state, pairs, patches, law)
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
-                    pair_forces(
-                        bounds[t], bounds[t + 1], state, spin, force[t], torque[t], pairs, law, length, spring_step
-                    )
+                    _pair_forces(t, bodies, pairs, law, spring_step, cohesive, frictional)
                 if parts > 1:
                     for t in prange(parts):
-                        for i in range(t * n // parts, (t + 1) * n // parts):
-                            for other in range(1, parts):
-                                for k in range(3):
-                                    force[0, i, k] += force[other, i, k]
-                                    force[other, i, k] = 0.0
-                                    if frictional:
-                                        torque[0, i, k] += torque[other, i, k]
-                                        torque[other, i, k] = 0.0
-                floor_forces(grounded, state, spin, force[0], torque[0], floor, floor_spring, law, spring_step)
+                        _add_layers(t, bodies, frictional)
+                _floor_forces(floor, bodies, law, spring_step, cohesive, frictional)
                 ready = True
             if done == steps:
                 return done, ready
             kick = 0.5 * time_step if starting else time_step
             starting = False
-            frame += frame_step
+            frame += listing.frame_step
             for t in prange(parts):
-                speed[t], too_fast[t] = move(
-                    t * n // parts,
-                    (t + 1) * n // parts,
-                    state,
-                    spin,
-                    force[0],
-                    torque[0],
-                    patch_speed,
-                    patch_limit,
-                    kick,
-                    time_step,
-                    frame_speed,
-                    law.gravity,
-                )
-            path = math.sqrt(speed.max()) * time_step
+                speed[t], too_fast[t] = _move(t, bodies, patches, kick, frame_speed, law, frictional)
             picked = 0 if too_fast.any() else max(picked - 1, 0)
-            drift += path  # none has moved farther
+            drift += math.sqrt(speed.max()) * time_step  # none has moved farther
             if not drift < limit:
-                drift = _farthest(state, reference, frame)
+                drift = _farthest(state, listing.reference, frame)
                 near_enough = drift < CLOSE_TO_LIMIT * limit
             done += 1
             ready = False
-            if not near_enough or not abs(frame) < limit or _disturbed(state, watched):
+            if not near_enough or not abs(frame) < limit or _disturbed(state, listing.watched):
                 return done, ready
 
     compiled: Callable[..., tuple[int, bool]] = advance

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +14,22 @@ import numpy as np
 from filtercake.errors import EngineError, EngineMissing
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import micro, process
-from filtercake.packing.engines.base import SettleRequest, parallelism
+from filtercake.packing.engines.base import Engine, SettleRequest, parallelism
 from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
 from filtercake.packing.engines.micro import UnitSystem
 from filtercake.packing.result import SettledState
-from filtercake.packing.scene import PackingSpec
+from filtercake.packing.scene import Scene
 from filtercake.packing.settling import WINDOW, Trajectory
 from filtercake.units import GRAVITY, FloatArray
+from filtercake.user_files import templates
 
 EXECUTABLE_VARIABLE = "FILTERCAKE_LIGGGHTS"
 EXECUTABLES = ("liggghts", "lmp_auto", "lmp_liggghts")
 TEMPLATE_FOLDER_VARIABLE = "FILTERCAKE_TEMPLATES"
 PROGRESS_SECONDS = 20.0
 LOOK_SECONDS = 5.0
+SMALL_BED = 10_000
+"""Spheres up to which LIGGGHTS is fast enough whatever the width of the distribution."""
 
 _BLOWN_UP = ("Lost atoms", "Non-numeric", "out of range", "Out of range", "neighbor list", "Bond atoms missing")
 """Words of LIGGGHTS's errors about spheres that fly apart, not about its input."""
@@ -53,11 +55,17 @@ def find_executable() -> str | None:
     return next((path for path in map(shutil.which, EXECUTABLES) if path), None)
 
 
-class Liggghts:
+class Liggghts(Engine):
     """LIGGGHTS with the tuned deck: shared cloud, tight box, small skin, only what the scene needs, early stop."""
 
     name = "liggghts"
+    label = "LIGGGHTS"
     template = "packing.in.j2"
+    sphere_step = (132e-9, 155e-9)
+    wide_factor = 1.8  # a wide distribution fills its one neighbour grid with pairs that never touch
+    least_restitution = 0.05
+    evidence = ("packing.in", "cloud.data", "screen.log")
+    by_hand = "liggghts -echo screen -in packing.in"
 
     def __init__(self, *, force_tangential: bool = False, units: UnitSystem = micro.MICRO):
         """Create the engine.
@@ -72,6 +80,12 @@ class Liggghts:
         self.force_tangential = force_tangential
         self.units = units
 
+    @classmethod
+    def suits(cls, scene: Scene) -> bool:
+        """Whether ``engine: auto`` may take it: where the bed is small or narrow, and the restitution not too low."""
+        fast = scene.particles <= SMALL_BED or not scene.is_wide
+        return fast and scene.restitution > cls.least_restitution
+
     def why_missing(self) -> str | None:
         """Say why LIGGGHTS cannot run here, None where it can."""
         if find_executable() is not None:
@@ -84,45 +98,47 @@ class Liggghts:
             f"or set {EXECUTABLE_VARIABLE} to the executable"
         )
 
-    def settle(self, request: SettleRequest) -> SettledState:
-        """Run LIGGGHTS on the request's cloud (see :class:`filtercake.packing.engines.base.Engine`)."""
-        write_cloud(request.cloud, request.spec.density, request.folder / "cloud.data", self.units)
-        return self._run(request, self._deck_values(request), expected=request.cloud.radius.size)
+    def write_input(self, request: SettleRequest) -> None:
+        """Write the deck and, where it reads one, the cloud."""
+        if not self.own_spheres:
+            write_cloud(request.cloud, request.scene.density, request.folder / "cloud.data", self.units)
+        deck = render(self.template, self._deck_values(request))
+        (request.folder / "packing.in").write_text(deck, encoding="utf-8")
 
     def _deck_values(self, request: SettleRequest) -> dict[str, Any]:
-        spec, rule = request.spec, request.rule
+        scene, rule = request.scene, request.rule
         return {
-            **material_values(spec, self.units),
-            "contact_model": contact_model(spec.friction > 0.0 or self.force_tangential, spec.cohesion > 0.0),
-            "tangential": spec.friction > 0.0 or self.force_tangential,
+            **material_values(scene, self.units),
+            "contact_model": contact_model(scene.friction > 0.0 or self.force_tangential, scene.cohesion > 0.0),
+            "tangential": scene.friction > 0.0 or self.force_tangential,
             "cloud_file": "cloud.data",
             "length": micro.number(request.cloud.length / self.units.length),
-            "skin": micro.number((spec.skin or default_skin(request.cloud)) / self.units.length),
+            "skin": micro.number((scene.skin or default_skin(request.cloud)) / self.units.length),
             "check_steps": rule.check_steps,
             "max_checks": rule.max_checks,
             "calm_checks": rule.calm_checks,
             "window": WINDOW,
             "height_tolerance": micro.number(rule.height_tolerance),
             "energy_fraction": micro.number(rule.energy_fraction),
-            "write_vtk": spec.write_vtk,
+            "write_vtk": scene.write_vtk,
         }
 
-    def _run(self, request: SettleRequest, values: dict[str, Any], expected: int | None) -> SettledState:
-        """Render the deck, run it, and read the outcome."""
-        folder, spec = request.folder, request.spec
-        (folder / "packing.in").write_text(render(self.template, values), encoding="utf-8")
+    def settle(self, request: SettleRequest) -> SettledState:
+        """Run LIGGGHTS and read the outcome (see :class:`filtercake.packing.engines.base.Engine`)."""
+        folder, scene = request.folder, request.scene
+        self.write_input(request)
         screen = folder / "screen.log"
         started = time.monotonic()
-        status = process.run(command(parallelism(spec)), folder, screen, spec.time_limit, _Watcher(screen, request))
+        status = process.run(command(parallelism(scene)), folder, screen, scene.time_limit, _Watcher(screen, request))
         wall_time = time.monotonic() - started
         log = parse_log(screen.read_text(encoding="utf-8", errors="replace"))
         check_end(status, log)
         position, velocity, radius = read_dump(folder / "final.dump", self.units)
         length = request.cloud.length
-        seen = trajectory(log, spec.time_step, length, spec.density, self.units)
-        wanted = expected if expected is not None else (log.inserted or 0)
+        seen = trajectory(log, scene.time_step, length, scene.density, self.units)
+        wanted = (log.inserted or 0) if self.own_spheres else request.cloud.radius.size
         if radius.size == wanted:  # one that lacks spheres is told so by the acceptance checks
-            check_dump(position, velocity, 4.0 / 3.0 * np.pi * spec.density * radius**3, seen)
+            check_dump(position, velocity, 4.0 / 3.0 * np.pi * scene.density * radius**3, seen)
         position[:, :2] %= length
         return SettledState(
             position=position,
@@ -168,17 +184,6 @@ class _Watcher:
             return parse_log(stream.read().decode("utf-8", "replace"))
 
 
-@cache
-def _environment(folder: str) -> jinja2.Environment:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
 def render(template: str, values: dict[str, Any]) -> str:
     """Fill a deck template.
 
@@ -189,7 +194,7 @@ def render(template: str, values: dict[str, Any]) -> str:
     """
     folder = template_folder()
     try:
-        return _environment(str(folder)).get_template(template).render(values)
+        return templates(folder).get_template(template).render(values)
     except jinja2.TemplateNotFound:
         raise EngineError(f"deck template {folder / template} does not exist") from None
     except jinja2.TemplateError as error:
@@ -331,19 +336,19 @@ def check_end(status: int, log: LiggghtsLog) -> None:
         )
 
 
-def material_values(spec: PackingSpec, units: UnitSystem) -> dict[str, Any]:
+def material_values(scene: Scene, units: UnitSystem) -> dict[str, Any]:
     """Return what every deck says of material and protocol, in its units."""
     return {
         "units": units.name,
-        "engine_seed": spec.seed,
-        "youngs_modulus": micro.number(spec.youngs_modulus / units.pressure),
-        "poisson_ratio": micro.number(spec.poisson_ratio),
-        "restitution": micro.number(spec.restitution),
-        "friction": micro.number(spec.friction),
-        "cohesion": micro.number(spec.cohesion / units.pressure),
-        "cohesive": spec.cohesion > 0.0,
-        "density": micro.number(spec.density / units.density),
+        "engine_seed": scene.seed,
+        "youngs_modulus": micro.number(scene.youngs_modulus / units.pressure),
+        "poisson_ratio": micro.number(scene.poisson_ratio),
+        "restitution": micro.number(scene.restitution),
+        "friction": micro.number(scene.friction),
+        "cohesion": micro.number(scene.cohesion / units.pressure),
+        "cohesive": scene.cohesion > 0.0,
+        "density": micro.number(scene.density / units.density),
         "gravity": micro.number(GRAVITY / units.acceleration),
-        "time_step": micro.number(spec.time_step / units.time),
-        "settling_velocity": micro.number(spec.settling_velocity / units.velocity),
+        "time_step": micro.number(scene.time_step / units.time),
+        "settling_velocity": micro.number(scene.settling_velocity / units.velocity),
     }

@@ -7,10 +7,8 @@ from typing import Any
 from filtercake.packing.engines import micro
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.liggghts import Liggghts, material_values
-from filtercake.packing.result import SettledState
+from filtercake.packing.scene import Scene
 
-STEPS = 150_000
-"""Fixed number of time steps (paper, Table 3)."""
 ROUNDS = 150
 SMALLEST_SEED = 10_000
 """LIGGGHTS takes only primes above this as random seeds."""
@@ -20,41 +18,41 @@ class LiggghtsAsPublished(Liggghts):
     """The authors' box, skin, insertion and fixed number of steps; it draws its own spheres, not the cloud."""
 
     name = "liggghts_as_published"
+    label = "LIGGGHTS (protocol as published)"
     template = "as_published.in.j2"
+    sphere_step = (700e-9, 700e-9)
+    wide_factor = 1.0
+    own_spheres = True
+    fixed_steps = 150_000  # paper, Table 3
 
-    def __init__(self, steps: int = STEPS):
-        """Create the engine; ``steps`` is the fixed number of time steps."""
-        super().__init__()
-        self.steps = steps
+    @classmethod
+    def suits(cls, scene: Scene) -> bool:  # noqa: ARG003
+        """Whether ``engine: auto`` may take it: never, it is there to be compared with."""
+        return False
 
-    def settle(self, request: SettleRequest) -> SettledState:
-        """Run the paper's protocol (see :class:`filtercake.packing.engines.base.Engine`)."""
-        return self._run(request, _published_values(request, self.steps), expected=None)
-
-
-def _published_values(request: SettleRequest, steps: int) -> dict[str, Any]:
-    csd, spec = request.csd, request.spec
-    seeds = prime_seeds(request.seed, csd.size.size + 2)
-    classes = [
-        {
-            "radius": micro.number(0.5 * size / micro.MICRO.length),
-            "volume_fraction": micro.number(fraction),
-            "seed": seed,
+    def _deck_values(self, request: SettleRequest) -> dict[str, Any]:
+        scene, csd = request.scene, request.scene.csd
+        seeds = prime_seeds(request.seed, csd.size.size + 2)
+        classes = [
+            {
+                "radius": micro.number(0.5 * size / micro.MICRO.length),
+                "volume_fraction": micro.number(fraction),
+                "seed": seed,
+            }
+            for size, fraction, seed in zip(csd.size, csd.volume_fraction, seeds[2:], strict=True)
+        ]
+        return {
+            **material_values(scene, micro.MICRO),
+            "length": micro.number(request.cloud.length / micro.MICRO.length),
+            "skin": micro.number((scene.skin or csd.largest) / micro.MICRO.length),
+            "classes": classes,
+            "distribution_seed": seeds[0],
+            "insertion_seed": seeds[1],
+            "particles": scene.particles,
+            "rounds": ROUNDS,
+            "round_steps": self.fixed_steps // ROUNDS,
+            "write_vtk": False,
         }
-        for size, fraction, seed in zip(csd.size, csd.volume_fraction, seeds[2:], strict=True)
-    ]
-    return {
-        **material_values(spec, micro.MICRO),
-        "length": micro.number(request.cloud.length / micro.MICRO.length),
-        "skin": micro.number((spec.skin or csd.largest) / micro.MICRO.length),
-        "classes": classes,
-        "distribution_seed": seeds[0],
-        "insertion_seed": seeds[1],
-        "particles": spec.particles,
-        "rounds": ROUNDS,
-        "round_steps": steps // ROUNDS,
-        "write_vtk": False,
-    }
 
 
 def prime_seeds(seed: int, count: int) -> list[int]:

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
+from filtercake.packing.engines import ENGINES, kind_of
 from filtercake.study import limits
 from filtercake.study.config.values import LARGEST_INTEGER, MOST_PARTICLES, TO_NUMBER, TO_WHOLE, Model
 from filtercake.study.limits import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
-from filtercake.units import MICROSECOND
 
-EngineName = Literal["auto", "liggghts", "embedded", "liggghts_as_published"]
+AUTO = "auto"
+"""Stands for the engine that this machine is best served with."""
+
+
+def _engine(name: str) -> str:
+    if name not in (AUTO, *ENGINES):
+        raise ValueError(f"allowed: {', '.join(map(repr, (AUTO, *ENGINES)))}")
+    return name
+
+
+EngineName = Annotated[str, AfterValidator(_engine), WithJsonSchema({"enum": [AUTO, *ENGINES], "type": "string"})]
 
 
 class Packing(Model):
@@ -60,7 +70,7 @@ class Packing(Model):
     max_replicates: Annotated[int, Field(ge=2, le=1000), TO_WHOLE] = Field(
         default=64, description="Packings per point after which porosity_ci95_target gives up, and says so."
     )
-    engine: EngineName = Field(default="auto", description="auto takes the best engine on this machine; or name one.")
+    engine: EngineName = Field(default=AUTO, description="auto takes the best engine on this machine; or name one.")
     seed: Annotated[int, Field(ge=0, le=LARGEST_INTEGER), TO_WHOLE] = Field(
         default=1, description="Base seed of all random numbers."
     )
@@ -82,13 +92,7 @@ class Packing(Model):
     write_vtk: bool = Field(default=False, description="Keep pictures of the settling for ParaView.")
 
     @model_validator(mode="after")
-    def _as_published(self) -> Packing:
-        if self.engine == "liggghts_as_published" and self.bed_depth_factor not in (None, 1.0):
-            raise ValueError("the engine liggghts_as_published has the paper's own box: bed_depth_factor must be 1")
+    def _paper_box(self) -> Packing:
+        if kind_of(self.engine).own_spheres and self.bed_depth_factor not in (None, 1.0):
+            raise ValueError(f"the engine {self.engine} has the paper's own box: bed_depth_factor must be 1")
         return self
-
-    def time_step(self, rayleigh: float, friction: float) -> float:
-        """Time step, s, from the Rayleigh time step (s) and the friction of a scene."""
-        if self.time_step_us is not None:
-            return self.time_step_us * MICROSECOND
-        return (self.time_step_rayleigh or limits.default_time_step(friction)) * rayleigh

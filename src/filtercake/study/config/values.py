@@ -1,4 +1,4 @@
-"""What values of a configuration may be: numbers as YAML gives them, names, paths, texts, and their bounds."""
+"""Types of the values of a configuration: numbers as YAML gives them, names, paths, texts, and their bounds."""
 
 from __future__ import annotations
 

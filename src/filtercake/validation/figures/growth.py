@@ -12,13 +12,7 @@ COLUMNS = {"particles": "Number of spheres", "size_ratio": "Largest over smalles
 
 
 def draw(table: pd.DataFrame) -> Figure:
-    """Draw both series side by side.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Columns series, particles, size_ratio, ns_per_particle_step, reference_ns.
-    """
+    """Draw both series side by side, from the table of :func:`filtercake.validation.growth.time_growth`."""
     figure, axes = style.panels(2, width=style.DOUBLE, height=2.7, columns=2, sharey=True)
     axes[0].set_ylabel("Time per sphere and step (ns)")
     for index, (panel, (column, label)) in enumerate(zip(axes, COLUMNS.items(), strict=True)):

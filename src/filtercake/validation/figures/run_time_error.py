@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from filtercake.figures import style
 from filtercake.filtration.resistance import log_sensitivity
+from filtercake.packing.engines import label_of
 from filtercake.units import FloatArray
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT
 
@@ -21,7 +22,7 @@ CASES = {
     "alum_wide": "Alum 15 min, N = 20 000",
 }
 AXES = ("time step", "spheres", "stop tolerance", "skin", "engine", "softer contacts", "truncation")
-"""What a variant differs in, in the order of colours."""
+"""Properties in which variants differ, in the order of colours."""
 AS_PUBLISHED = "as published"
 INTERIOR, COUNT = "interior slab", "count"
 REPLICATES = (1, 2, 4, 8, 16, 32)
@@ -35,14 +36,9 @@ STAR: dict[str, Any] = {
 
 
 def draw(table: pd.DataFrame, references: pd.DataFrame) -> Figure:
-    """Draw one panel per case.
+    """Draw one panel per case, from all cases of :func:`filtercake.validation.error_against_time.errors`.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Of :func:`filtercake.validation.error_against_time.errors`, all cases.
-    references : DataFrame
-        Columns case, porosity, standard_error.
+    ``references`` has the columns case, porosity and standard_error.
     """
     cases = [case for case in CASES if case in set(table["case"])]
     figure, panels = style.panels(len(cases), width=style.DOUBLE, height=2.9 * -(-len(cases) // 2), columns=2)
@@ -70,21 +66,16 @@ def _panel(axes: Axes, rows: pd.DataFrame, noise: float) -> None:
     axes.set_xlabel("Run time of one packing (s)")
     axes.set_ylabel("Error in porosity (–)")
     axes.axhspan(LEAST_ERROR, max(noise, LEAST_ERROR), color=style.FAINT, alpha=0.2, linewidth=0)
+    default = interior[interior["axis"] == DEFAULT]
+    own = "".join(default["engine"].head(1))
     for index, axis in enumerate(AXES):
         here = interior[interior["axis"] == axis]
-        for engine, marker in (("embedded", "o"), ("liggghts", "s")):
-            of = here[here["engine"] == engine]
-            label = {"embedded": axis, "liggghts": f"{axis}, LIGGGHTS"}[engine]
-            if len(of):
-                axes.plot(
-                    of["seconds"],
-                    _shown(of["error"]),
-                    marker,
-                    color=style.colour(index),
-                    markersize=4,
-                    label=label if axis != "engine" else "LIGGGHTS, default",
-                )
-    _default(axes, interior[interior["axis"] == DEFAULT], noise)
+        for engine, of in here.groupby("engine"):
+            other = label_of(str(engine))
+            label = axis if engine == own else f"{other}, default" if axis == "engine" else f"{axis}, {other}"
+            marker = "o" if engine == own else "s"
+            axes.plot(of["seconds"], _shown(of["error"]), marker, color=style.colour(index), markersize=4, label=label)
+    _default(axes, default, noise)
     for estimator, fill in ((COUNT, style.INK), (INTERIOR, "white")):
         label = f"{AS_PUBLISHED}, {estimator}"
         published = rows[(rows["axis"] == AS_PUBLISHED) & (rows["estimator"] == estimator)]

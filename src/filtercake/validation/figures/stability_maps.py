@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from filtercake.figures import style
-from filtercake.validation.stability import OUTCOMES
+from filtercake.packing.engines import label_of
+from filtercake.validation.stability import OUTCOMES, SI_UNITS
 
 COLOURS = {
     "ok": "#009E73",
@@ -30,17 +31,10 @@ NAMES = {
     "density_kg_m3": "Density (kg/m³)",
     "drop_height": "Drop height / the paper's",
 }
-ENGINES = {"embedded": "embedded", "liggghts": "LIGGGHTS", "liggghts_si": "LIGGGHTS, SI units"}
 
 
 def draw(table: pd.DataFrame) -> Figure:
-    """Draw one map per family and engine; cases are evenly spaced, whatever their values.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Of :func:`filtercake.validation.stability.run`, all families.
-    """
+    """Draw one map per family and engine; cases are evenly spaced, whatever their values."""
     maps = list(table[["family", "engine"]].drop_duplicates().itertuples(index=False, name=None))
     figure, panels = style.panels(len(maps), width=style.DOUBLE, height=1.9 * -(-len(maps) // 3) + 0.5, columns=3)
     for axes, (family, engine) in zip(panels, maps, strict=True):
@@ -99,4 +93,6 @@ def _map(axes: Axes, rows: pd.DataFrame, engine: str) -> None:
     axes.tick_params(labelsize=5.5)
     axes.set_xlabel(NAMES[rows["x_name"].iloc[0]], fontsize=7)
     axes.set_ylabel(NAMES[rows["y_name"].iloc[0]], fontsize=7)
-    axes.set_title(ENGINES.get(engine, engine), loc="left", fontsize=7)
+    axes.set_title(
+        f"{label_of(engine.removesuffix('_si'))}{', SI units' if engine == SI_UNITS else ''}", loc="left", fontsize=7
+    )

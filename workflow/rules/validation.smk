@@ -1,5 +1,7 @@
-# Benchmarks: targets of their own, never part of a study.
-import re
+# What proves the product: targets of their own, never part of a study. Read only when the command line names one of
+# these rules, of their files or of their studies (validation_is_asked in common.smk).
+from filtercake.study.points import with_engine
+from filtercake.validation.stability import families as stress_families
 
 # the studies of the comparison of engines, made by each
 AGREEMENT_ENGINES = ["liggghts", "embedded"]
@@ -101,7 +103,6 @@ rule repeat_calibrations:
 
 # several beds held against one of the paper's own size; these two are users' studies, so that they may be other files
 # (asked for by path), or broken, which must not stop anything else
-BED_SIZES = ["alum", "alum_full"]
 try:
     known_sizes = {
         study.name: study
