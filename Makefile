@@ -3,7 +3,7 @@ VENV ?= .venv
 CORES ?= 2
 PROFILE ?=
 STUDIES ?=
-CALIBRATION ?= pmma
+CALIBRATION ?= synthetic
 REPORT ?= results/report.html
 SEED ?= 1
 BIN := $(VENV)/bin
@@ -25,6 +25,22 @@ REPORTED := $(if $(STUDIES)$(JOINED),--config $(if $(STUDIES),studies=$(STUDIES)
 RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(CONFIG),calibrate --config calibrations=$(CALIBRATION))
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+
+# a misspelt variable would be ignored, and something else be run than was meant
+TAKES_run := STUDIES
+TAKES_figures := STUDIES
+TAKES_retry := STUDIES
+TAKES_resume := STUDIES CALIBRATION
+TAKES_calibrate := CALIBRATION
+TAKES_report := STUDIES CALIBRATIONS REPORT
+TAKES_benchmark := QUICK
+TAKES_stability := QUICK
+TAKES_faults := COUNT SEED
+TAKES_fuzz := COUNT SEED
+TAKEN := CORES PROFILE $(foreach goal,$(MAKECMDGOALS),$(TAKES_$(goal)))
+GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$(name)))
+UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
+$(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
 .PHONY: run report browser benchmark stability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
 
@@ -79,7 +95,7 @@ format: setup ## format the code
 schemas: setup ## regenerate the JSON schemas and the reference of config keys
 	$(BIN)/python -m filtercake.cli.schema
 
-calibrate: setup ## fit the cohesion to measured resistances (CALIBRATION=name of a file in config/calibrations)
+calibrate: setup ## fit the cohesion to measured resistances (CALIBRATION=name of a file in config/calibrations; synthetic, whose answer is known, if left out)
 	$(SNAKEMAKE) calibrate --config calibrations=$(CALIBRATION)
 
 figures: setup ## redraw the figures
@@ -87,7 +103,7 @@ figures: setup ## redraw the figures
 
 report: setup ## figures, tables, captions, method in one file: results/report.html (STUDIES=a,b REPORT=file.html)
 	$(SNAKEMAKE) report $(REPORTED)
-	$(SNAKEMAKE) report $(REPORTED) --report $(REPORT) --report-stylesheet workflow/report/report.css
+	$(SNAKEMAKE) report $(REPORTED) --report "$(REPORT)" --report-stylesheet workflow/report/report.css
 	@echo "report: $(REPORT)"
 
 benchmark: setup ## run time against error: docs/benchmark.md (about 30 min on 2 cores; QUICK=1: a few minutes, docs untouched)

@@ -8,7 +8,7 @@ min_version("9.20")
 include: "workflow/rules/config_file.smk"
 
 
-configfile: "config/config.yaml"
+configfile: CONFIG_FILE
 
 
 include: "workflow/rules/common.smk"
@@ -28,7 +28,7 @@ if validation_is_asked():
 
 
 rule all:
-    default_target: True
+    default_target: has_no_rule_yet
     input:
         expand("{results}/{study}/provenance.json", results=RESULTS, study=STUDIES),
     localrule: True

@@ -51,12 +51,13 @@ class Checkout:
 
 
 def copy_project(target: Path) -> Checkout:
-    """Copy the project, with the kernels that are compiled already."""
+    """Copy the project, with the kernels that are compiled already, to a path that nobody would choose."""
+    target = target.with_name(f"user's own {target.name}")
     target.mkdir(parents=True, exist_ok=True)
     for part in PARTS:
         source = PROJECT / part
         if source.is_dir():
-            shutil.copytree(source, target / part, ignore=shutil.ignore_patterns("*.egg-info"))
+            shutil.copytree(source, target / part, symlinks=True, ignore=shutil.ignore_patterns("*.egg-info"))
         else:
             shutil.copy(source, target / part)
     return Checkout(target)

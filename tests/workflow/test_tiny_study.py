@@ -73,6 +73,10 @@ def edited(path, change):
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
+def changed(text):
+    return text + "\nEDITED = True\n"
+
+
 def commented(text):
     return text + "\n# edited\n"
 
@@ -91,12 +95,17 @@ def commented(text):
     ],
 )
 def test_an_edit_reruns_exactly_what_depends_on_it(finished, file, rules):
-    with edited(finished.root / file, commented):
+    with edited(finished.root / file, changed):
         planned = finished.planned()
     assert set(planned) - {"all"} == rules
     assert planned["packing"] in (0, 5)
     if file.endswith("cross_section.py"):
         assert planned["figure"] == 1
+
+
+def test_a_comment_in_the_library_remakes_nothing(finished):
+    with edited(finished.root / "src/filtercake/crystals/csd.py", commented):
+        assert not finished.planned()
 
 
 def test_a_new_value_in_the_study_makes_only_the_new_points(finished):
@@ -106,6 +115,13 @@ def test_a_new_value_in_the_study_makes_only_the_new_points(finished):
     assert planned["packing"] == 2  # one per friction
     assert planned["csd"] == 0
     assert set(planned) - {"all"} == {"packing", "points", *AFTER_PACKING}
+
+
+def test_a_plan_counts_what_is_made_not_what_is_kept(finished):
+    study = finished.root / "config/test/tiny.yaml"
+    with edited(study, lambda text: text.replace("replicates: 2", "replicates: 3")):
+        done = finished.run("--dry-run")
+    assert "tiny: 5 of 5 points, 5 packings to make with" in done.stderr
 
 
 def test_a_label_in_the_study_makes_no_packing(finished):

@@ -18,7 +18,6 @@ checkpoint choose_round:
         manifests_of_rounds(rounds_before),
         rounds=rounds_before,
         csds=calibration_csds,
-        library=library("calibration.rounds"),
     output:
         "{results}/{calibration}/rounds/{number}.json",
     log:
@@ -32,6 +31,7 @@ checkpoint choose_round:
         mem_mb=1000,
         runtime=10,
     params:
+        library=library("calibration.rounds"),
         calibration=calibration_params,
         packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",
     message:
@@ -45,7 +45,6 @@ checkpoint calibrate_cohesion:
         manifests_of_rounds(all_rounds),
         rounds=all_rounds,
         csds=calibration_csds,
-        library=library("calibration.rounds"),
     output:
         summary="{results}/{calibration}/calibration.json",
         tables=expand("{{results}}/{{calibration}}/tables/{table}.csv", table=TABLES),
@@ -60,6 +59,7 @@ checkpoint calibrate_cohesion:
         mem_mb=1000,
         runtime=10,
     params:
+        library=library("calibration.rounds"),
         calibration=calibration_params,
         packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",
     message:
@@ -75,8 +75,6 @@ rule predictions:
         summary="{results}/{calibration}/calibration.json",
         rounds=all_rounds,
         csds=calibration_csds,
-        library=library("calibration.rounds"),
-        tables=library("results.paper_tables"),
     output:
         "{results}/{calibration}/tables/predictions.csv",
     log:
@@ -90,6 +88,8 @@ rule predictions:
         mem_mb=1000,
         runtime=10,
     params:
+        library=library("calibration.rounds"),
+        tables=library("results.paper_tables"),
         calibration=calibration_params,
         packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",
         study=lambda wildcards: calibration_of(wildcards).study.model.model_dump(
@@ -104,7 +104,6 @@ rule predictions:
 rule measurement_fits:
     input:
         files=measurement_files,
-        library=library("calibration.measurements"),
     output:
         fits="{results}/{calibration}/tables/fits.csv",
         compressibility="{results}/{calibration}/tables/compressibility.csv",
@@ -118,6 +117,8 @@ rule measurement_fits:
     resources:
         mem_mb=500,
         runtime=5,
+    params:
+        library=library("calibration.measurements"),
     message:
         "fitting the filtration tests of {wildcards.calibration}"
     script:
@@ -130,7 +131,6 @@ rule calibration_figure:
         summary="{results}/{calibration}/calibration.json",
         tables=expand("{{results}}/{{calibration}}/tables/{table}.csv", table=TABLES),
         predictions=prediction_tables,
-        library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
     output:
         png=report(
             "{results}/{calibration}/figures/{figure}.png",
@@ -152,8 +152,9 @@ rule calibration_figure:
         "../envs/filtercake.yaml"
     resources:
         mem_mb=2000,
-        runtime=15,
+        runtime=figure_minutes,
     params:
+        library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
         title=lambda wildcards: calibration_of(wildcards).model.title,
         labels=lambda wildcards: {
             name: csd.label

@@ -1,16 +1,21 @@
 # Loads and checks the configuration, and offers the helpers that the rules share. Stops here, before any job,
 # with every problem of every file when something is wrong.
+import atexit
 import os
 import re
 import time
+from dataclasses import replace
+from functools import cache
 
+import pandas as pd
+from filtercake.crystals.csd import from_table
 from filtercake.figures import catalogue
 from filtercake.packing.engines.base import parallelism
-from filtercake.packing.pack import MANIFEST
+from filtercake.packing.pack import MANIFEST, count_kept, point_key
 from filtercake.packing.result import read_record
-from filtercake.run import console
+from filtercake.run import console, slurm
 from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
-from filtercake.run.provenance import packing_sources, sources
+from filtercake.run.provenance import code_hash, packing_code, sources
 from filtercake.study import engine_choice, estimate
 from filtercake.study.loading import (
     find_studies,
@@ -18,7 +23,7 @@ from filtercake.study.loading import (
     with_names_as_written,
 )
 from filtercake.study.points import expand as expand_points
-from filtercake.units import MICROMETRE
+from filtercake.units import MICROMETRE, MINUTE
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
@@ -26,7 +31,8 @@ for handler in logger.handlers:
     if handler.name == "DefaultStreamHandler":
         handler.addFilter(console.worth_reading)
 
-ROOT = Path(workflow.basedir)
+STUDY_FILES = Path(in_use("config/studies"))
+CALIBRATION_FILES = Path(in_use("config/calibrations"))
 VALIDATION = ROOT / "workflow" / "rules" / "validation.smk"
 # studies whose names do not hold that of a rule of validation
 BED_SIZES = ["alum", "alum_full"]
@@ -49,9 +55,7 @@ try:
     settings = load_workflow(named, CONFIG_FILE)
     STUDIES = {
         study.name: study
-        for study in load_studies(
-            find_studies(settings, ROOT / "config" / "studies", CONFIG_FILE)
-        )
+        for study in load_studies(find_studies(settings, STUDY_FILES, CONFIG_FILE))
     }
     POINTS = points_by_name(STUDIES)
     CALIBRATIONS = []
@@ -61,8 +65,8 @@ try:
 
         CALIBRATIONS = load_calibrations(
             settings.calibrations,
-            ROOT / "config" / "calibrations",
-            ROOT / "config" / "studies",
+            CALIBRATION_FILES,
+            STUDY_FILES,
             CONFIG_FILE,
         )
     engine_choice.check([*STUDIES.values(), *(item.study for item in CALIBRATIONS)])
@@ -86,13 +90,8 @@ wildcard_constraints:
 
 
 def library(module):
-    """Library files behind a module: inputs, because Snakemake does not see imports."""
-    return [str(path) for path in sources(module)]
-
-
-def packing_library(wildcards):
-    """Those behind a point's packings: of the engines, only the one it uses."""
-    return [str(path) for path in packing_sources(point_of(wildcards).scene.engine)]
+    """Hash of the library's code behind a module: a param of rules, because Snakemake does not see imports."""
+    return code_hash(sources(module))
 
 
 def study_of(wildcards):
@@ -160,14 +159,51 @@ def csd_file(wildcards):
     return [str(file)] if file else []
 
 
+def is_slurm():
+    """Whether this process submits to Slurm; known once all rules are read."""
+    return getattr(workflow.executor_plugin, "name", None) == "slurm"
+
+
+@cache
+def partitions():
+    return slurm.partitions() if is_slurm() else []
+
+
+@cache
+def partition():
+    """The partition that packings are submitted to; None where it is not known, or there is no cluster."""
+    asked = {
+        **(workflow.resource_settings.default_resources or {}),
+        **workflow.resource_settings.overwrite_resources.get("packing", {}),
+    }.get("slurm_partition")
+    return slurm.partition_of(
+        None if asked is None else str(getattr(asked, "value", asked)), partitions()
+    )
+
+
+def granted_minutes():
+    """Longest walltime of a submission."""
+    limit = partition() and partition().longest_minutes
+    return min(limit or estimate.LONGEST_MINUTES, estimate.LONGEST_MINUTES)
+
+
 def packing_minutes(wildcards, attempt):
-    """Walltime from measured run times; doubled on every retry."""
-    return estimate.walltime_minutes(point_of(wildcards), attempt)
+    """Walltime from measured run times; doubled on every retry, within what is granted."""
+    return estimate.walltime_minutes(
+        point_of(wildcards), attempt, granted=granted_minutes()
+    )
+
+
+def figure_minutes(wildcards):
+    """Walltime of a figure: those of all studies may share a submission."""
+    together = workflow.group_settings.group_components.get("figures", 1)
+    together = min(together, 12 * (len(STUDIES) + len(CALIBRATIONS)))
+    return max(1, min(15, granted_minutes() // together))
 
 
 def packing_group(wildcards):
     """Name of the submissions that short points share on a cluster; the profile says how many."""
-    size = estimate.group_size(point_of(wildcards))
+    size = estimate.group_size(point_of(wildcards), granted=granted_minutes())
     return f"packing_{size}" if size > 1 else None
 
 
@@ -182,20 +218,76 @@ def points_of_run():
 
 
 def points_to_make():
-    """Points by study whose packings are about to be made."""
+    """Points by study and name whose packings are about to be made."""
     found = {}
-    for job in workflow.dag.needrun_jobs():
+    for job in workflow.dag.needrun_jobs(exclude_finished=False):
         if job.rule.name == "packing":
-            found.setdefault(job.wildcards.study, []).append(point_of(job.wildcards))
+            point = point_of(job.wildcards)
+            found.setdefault(job.wildcards.study, {})[point.name] = point
     return found
 
 
-def cost_of(points_by_study):
+def missing_packings(study, point):
+    """How many of a point's packings are to be made; those finished before are kept."""
+    folder, table = Path(RESULTS, study), Path(
+        RESULTS, study, "csd", f"{point.csd}.csv"
+    )
+    packings = folder / "packings" / point.name
+    if not (packings.is_dir() and table.is_file()):
+        return point.replicates
+    _, csd = from_table(pd.read_csv(table))
+    key = point_key(packing_code(point.scene.engine), replace(point.scene, csd=csd))
+    return point.replicates - count_kept(packings, key, point.replicates)
+
+
+def cost_of(points_by_study, missing):
     """What the packings of points will cost."""
     return estimate.together(
-        estimate.estimate(points, on_cluster=not workflow.local_exec)
-        for points in points_by_study.values()
+        estimate.estimate(
+            [
+                replace(point, replicates=missing[study][name])
+                for name, point in points.items()
+            ],
+            on_cluster=not workflow.local_exec,
+        )
+        for study, points in points_by_study.items()
     )
+
+
+def too_long():
+    """Say which points are expected to take longer than their partition grants."""
+    seconds = [
+        estimate.job_seconds(point)
+        for points in points_to_make().values()
+        for point in points.values()
+    ]
+    late = [item for item in seconds if item > MINUTE * granted_minutes()]
+    if late and partition():
+        text = slurm.too_long(partition(), partitions(), len(late), max(late))
+        return [f"warning: {text}"]
+    return []
+
+
+def announcement():
+    """The plan of the run, and the number of packings in it."""
+    to_make = points_to_make()
+    missing = {
+        study: {name: missing_packings(study, point) for name, point in points.items()}
+        for study, points in to_make.items()
+    }
+    lines = too_long()
+    for name in points_of_run():
+        lines += [f"warning: {warning}" for warning in KNOWN[name].warnings]
+        lines += [
+            f"{name}: {csd}: {item.file}: {item.full.understood}"
+            for csd, item in KNOWN[name].csds.items()
+            if item.file is not None
+        ]
+    if points_of_run():
+        lines.append(console.plan(points_of_run(), missing))
+    if to_make:
+        lines.append(cost_of(to_make, missing).words(cores_of_run()))
+    return "\n".join(lines), sum(sum(group.values()) for group in missing.values())
 
 
 def cluster_logs():
@@ -211,27 +303,30 @@ def cores_of_run():
 
 
 def begin_run():
-    to_make = points_to_make()
-    packings = sum(point.replicates for group in to_make.values() for point in group)
+    text, packings = announcement()
     try:
         Progress.begin(Path(os.environ[PROGRESS_VARIABLE]), packings)
     except OSError as error:
         raise WorkflowError(
             f"the results folder {RESULTS} cannot be written: {error.strerror}"
         )
-    for name in points_of_run():
-        for warning in KNOWN[name].warnings:
-            print(f"warning: {warning}", file=sys.stderr)
-        for csd, item in KNOWN[name].csds.items():
-            if item.file is not None:
-                print(
-                    f"{name}: {csd}: {item.file}: {item.full.understood}",
-                    file=sys.stderr,
-                )
-    if points_of_run():
-        print(console.plan(points_of_run(), packings), file=sys.stderr)
-    if to_make:
-        print(cost_of(to_make).words(cores_of_run()), file=sys.stderr)
+    if text:
+        print(text, file=sys.stderr)
+    if is_slurm():
+        slurm.watch(
+            Path.cwd().resolve(), lambda line: print(line, file=sys.stderr, flush=True)
+        )
+
+
+def announce_dry_run():
+    # there are no jobs where the run could not even be planned
+    if workflow.dryrun and workflow.dag is not None:
+        print(announcement()[0], file=sys.stderr)
+
+
+if not is_module:
+    # Snakemake starts no handler for a dry run, and says after the rules are read that it is one
+    atexit.register(announce_dry_run)
 
 
 def validation_is_asked():

@@ -118,7 +118,7 @@ def outputs_of_calibration(name):
 
 def calibration_outputs(wildcards):
     if not CALIBRATED:
-        files = (ROOT / "config" / "calibrations").glob("*.yaml")
+        files = CALIBRATION_FILES.glob("*.yaml")
         raise WorkflowError(
             "no calibration is asked for: give --config calibrations=<name> (or calibrations in "
             f"{CONFIG_FILE}); allowed: {', '.join(sorted(file.stem for file in files))}, or the path of a file"

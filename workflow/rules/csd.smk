@@ -4,7 +4,6 @@
 rule csd:
     input:
         file=csd_file,
-        library=library("crystals.crystallizer") + library("crystals.size_laws"),
     output:
         "{results}/{study}/csd/{csd}.csv",
     log:
@@ -18,6 +17,7 @@ rule csd:
         mem_mb=500,
         runtime=5,
     params:
+        library=library("crystals.crystallizer") + library("crystals.size_laws"),
         source=csd_params,
     message:
         "size distribution {wildcards.csd} of {wildcards.study}"
@@ -28,7 +28,6 @@ rule csd:
 rule crystallizer:
     input:
         csds=csd_tables,
-        library=library("results.paper_tables"),
     output:
         "{results}/{study}/tables/crystallizer.csv",
     log:
@@ -42,6 +41,7 @@ rule crystallizer:
         mem_mb=500,
         runtime=5,
     params:
+        library=library("results.paper_tables"),
         study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
         states=crystallizer_states,
     message:

@@ -8,7 +8,6 @@ rule figure:
         replicates="{results}/{study}/replicates.csv",
         csds=csd_tables,
         crystallizer=crystallizer_tables,
-        library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
     output:
         png=report(
             "{results}/{study}/figures/{figure}.png",
@@ -30,8 +29,9 @@ rule figure:
         "../envs/filtercake.yaml"
     resources:
         mem_mb=2000,
-        runtime=15,
+        runtime=figure_minutes,
     params:
+        library=lambda wildcards: library(catalogue.module_of(wildcards.figure)),
         study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
     message:
         "{wildcards.figure} of {wildcards.study}"

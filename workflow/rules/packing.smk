@@ -5,10 +5,6 @@
 rule packing:
     input:
         csd=lambda wildcards: f"{RESULTS}/{wildcards.study}/csd/{point_of(wildcards).csd}.csv",
-        library=packing_library,
-        templates=sorted(
-            str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
-        ),
     output:
         "{results}/{study}/packings/{point}/replicates.json",
     log:
@@ -25,6 +21,7 @@ rule packing:
         runtime=packing_minutes,
         cpus_per_task=lambda wildcards: parallelism(point_of(wildcards).scene),
     params:
+        code=lambda wildcards: packing_code(point_of(wildcards).scene.engine),
         scene=lambda wildcards: point_of(wildcards).scene.decisive(),
         # what follows from resources is no reason to make a packing again
         incidental=lambda wildcards, resources: point_of(wildcards).scene.incidental(),

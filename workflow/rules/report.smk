@@ -39,7 +39,6 @@ rule study_pages:
         page=PAGE_TEMPLATE,
         front=f"{CAPTION_TEMPLATES}/front_study.html.j2",
         templates=caption_templates(),
-        library=library("report.captions"),
     output:
         captions=directory("{results}/{study}/report/captions"),
         pages=report(
@@ -59,6 +58,7 @@ rule study_pages:
         mem_mb=1000,
         runtime=10,
     params:
+        library=library("report.captions"),
         study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
     message:
         "report pages of {wildcards.study}"
@@ -81,7 +81,6 @@ rule calibration_pages:
         page=PAGE_TEMPLATE,
         front=f"{CAPTION_TEMPLATES}/front_calibration.html.j2",
         templates=caption_templates(),
-        library=library("report.captions"),
     output:
         captions=directory("{results}/{calibration}/report/captions"),
         pages=report(
@@ -101,6 +100,7 @@ rule calibration_pages:
         mem_mb=1000,
         runtime=10,
     params:
+        library=library("report.captions"),
         title=lambda wildcards: calibration_of(wildcards).model.title,
         labels=lambda wildcards: {
             name: csd.label
@@ -119,7 +119,6 @@ rule documentation_page:
     input:
         text=lambda wildcards: str(ROOT / "docs" / f"{wildcards.document}.md"),
         page=PAGE_TEMPLATE,
-        library=library("report.markdown") + library("report.pages"),
     output:
         report(
             "{results}/pages/{document}.html",
@@ -136,6 +135,7 @@ rule documentation_page:
         mem_mb=500,
         runtime=5,
     params:
+        library=library("report.markdown") + library("report.pages"),
         title=lambda wildcards: DOCUMENTATION[wildcards.document],
     message:
         "page {wildcards.document}"

@@ -2,8 +2,6 @@
 
 
 rule points:
-    input:
-        library=library("study.points"),
     output:
         "{results}/{study}/points.csv",
     log:
@@ -17,6 +15,7 @@ rule points:
         mem_mb=500,
         runtime=5,
     params:
+        library=library("study.points"),
         points=point_rows,
     message:
         "points of {wildcards.study}"
@@ -28,7 +27,6 @@ rule replicates:
     input:
         manifests=manifests,
         csds=csd_tables,
-        library=library("results.replicates"),
     output:
         "{results}/{study}/replicates.csv",
     log:
@@ -39,8 +37,9 @@ rule replicates:
         "../envs/filtercake.yaml"
     resources:
         mem_mb=2000,
-        runtime=30,
+        runtime=lambda wildcards: min(30, granted_minutes()),
     params:
+        library=library("results.replicates"),
         points=point_rows,
         sphericity=lambda wildcards: study_of(wildcards).model.material.sphericity,
     message:
@@ -52,7 +51,6 @@ rule replicates:
 rule summary:
     input:
         replicates="{results}/{study}/replicates.csv",
-        library=library("results.replicates"),
     output:
         "{results}/{study}/summary.csv",
     log:
@@ -65,6 +63,8 @@ rule summary:
     resources:
         mem_mb=500,
         runtime=5,
+    params:
+        library=library("results.replicates"),
     message:
         "means and intervals of {wildcards.study}"
     script:
@@ -76,7 +76,6 @@ rule tables:
         summary="{results}/{study}/summary.csv",
         replicates="{results}/{study}/replicates.csv",
         csds=csd_tables,
-        library=library("results.paper_tables"),
     output:
         table1="{results}/{study}/tables/table1.csv",
         table2="{results}/{study}/tables/table2.csv",
@@ -93,6 +92,7 @@ rule tables:
         mem_mb=500,
         runtime=5,
     params:
+        library=library("results.paper_tables"),
         study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
     message:
         "tables of {wildcards.study}"
@@ -104,7 +104,6 @@ rule filter_design:
     input:
         summary="{results}/{study}/summary.csv",
         csds=csd_tables,
-        library=library("results.filter_design"),
     output:
         "{results}/{study}/tables/filter.csv",
     log:
@@ -118,6 +117,7 @@ rule filter_design:
         mem_mb=500,
         runtime=5,
     params:
+        library=library("results.filter_design"),
         study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
     message:
         "filter of {wildcards.study}"

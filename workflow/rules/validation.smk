@@ -27,7 +27,6 @@ rule compare_engines:
         replicates=expand(
             "{results}/{study}/replicates.csv", results=RESULTS, study=AGREEMENT
         ),
-        library=library("validation.agreement"),
     output:
         table="{results}/benchmark/agreement.csv",
         replicates="{results}/benchmark/agreement_replicates.csv",
@@ -41,6 +40,7 @@ rule compare_engines:
         mem_mb=500,
         runtime=5,
     params:
+        library=library("validation.agreement"),
         engines=AGREEMENT_ENGINES,
     message:
         "comparing the engines' ensembles"
@@ -85,7 +85,6 @@ rule repeat_calibrations:
             results=RESULTS,
             study=["twin_truth", "twin_friction_truth"],
         ),
-        library=library("validation.twin"),
     output:
         table="{results}/benchmark/twin.csv",
         repeats="{results}/benchmark/twin_repeats.csv",
@@ -99,6 +98,7 @@ rule repeat_calibrations:
         mem_mb=1000,
         runtime=10,
     params:
+        library=library("validation.twin"),
         repeats=20,
         tests=4,
         noise=0.05,
@@ -164,7 +164,6 @@ rule bed_size:
 rule compare_sizes:
     input:
         replicates=bed_size_tables,
-        library=library("validation.agreement"),
     output:
         "{results}/benchmark/bed_size.csv",
     log:
@@ -176,6 +175,8 @@ rule compare_sizes:
     resources:
         mem_mb=500,
         runtime=5,
+    params:
+        library=library("validation.agreement"),
     message:
         "comparing the sizes of beds"
     script:
@@ -222,7 +223,6 @@ rule speed:
 
 rule time_in_turn:
     input:
-        library=library("validation.timing"),
         templates=sorted(
             str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
         ),
@@ -241,6 +241,7 @@ rule time_in_turn:
         mem_mb=2000,
         runtime=180,
     params:
+        library=library("validation.timing"),
         case=lambda wildcards: SPEED[wildcards.case],
     message:
         "timing {wildcards.case}"
@@ -255,9 +256,6 @@ rule growth:
 
 
 rule time_growth:
-    input:
-        library=library("validation.growth"),
-        figure=library("validation.figures.growth"),
     output:
         table="{results}/benchmark/growth.csv",
         png="{results}/benchmark/growth.png",
@@ -274,6 +272,8 @@ rule time_growth:
         mem_mb=2000,
         runtime=60,
     params:
+        library=library("validation.growth"),
+        figure=library("validation.figures.growth"),
         study=str(ROOT / "config" / "studies" / "pmma.yaml"),
         csd="pmma_50_50",
         cases=[
@@ -393,7 +393,6 @@ rule benchmark:
 rule time_variants:
     input:
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
-        library=library("validation.error_against_time"),
         templates=sorted(
             str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
         ),
@@ -412,6 +411,7 @@ rule time_variants:
         mem_mb=2000,
         runtime=120,
     params:
+        library=library("validation.error_against_time"),
         case=lambda wildcards: ERROR_CASES[wildcards.case],
         quick=QUICK,
     message:
@@ -421,8 +421,6 @@ rule time_variants:
 
 
 rule choices:
-    input:
-        library=library("validation.error_against_time"),
     output:
         f"{BENCHMARK}/choices.csv",
     log:
@@ -435,6 +433,7 @@ rule choices:
         mem_mb=1000,
         runtime=60,
     params:
+        library=library("validation.error_against_time"),
         study=PMMA,
         csd="pmma_50_50",
         wide=ALUM,
@@ -449,7 +448,6 @@ rule choices:
 rule coverage:
     input:
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
-        library=library("validation.error_against_time"),
     output:
         f"{BENCHMARK}/coverage.csv",
     log:
@@ -462,6 +460,7 @@ rule coverage:
         mem_mb=1000,
         runtime=60,
     params:
+        library=library("validation.error_against_time"),
         case=ERROR_CASES["pmma"],
         interval=0.002,
         repeats=4 if QUICK else 20,
@@ -481,8 +480,6 @@ rule benchmark_page:
         reference=str(DATA / "reference_replicates.csv"),
         choices=tables_of_page(str(DATA / "choices.csv"), f"{BENCHMARK}/choices.csv"),
         template=str(ROOT / "workflow" / "report" / "benchmark.md.j2"),
-        library=library("validation.pages"),
-        figure=library("validation.figures.run_time_error"),
     output:
         table="{folder}/run_time_error.csv",
         png="{folder}/images/run_time_error.png",
@@ -500,6 +497,8 @@ rule benchmark_page:
         mem_mb=1000,
         runtime=5,
     params:
+        library=library("validation.pages"),
+        figure=library("validation.figures.run_time_error"),
         cases=ERROR_CASES,
         data=lambda wildcards, input: str(Path(input.reference).parent),
     message:
@@ -517,7 +516,6 @@ rule stability:
 
 rule stress:
     input:
-        library=library("validation.stability"),
         templates=sorted(
             str(path) for path in (ROOT / "liggghts_templates").glob("*.j2")
         ),
@@ -535,6 +533,7 @@ rule stress:
         mem_mb=2000,
         runtime=120,
     params:
+        library=library("validation.stability"),
         quick=QUICK,
     message:
         "stress tests: {wildcards.family}"
@@ -553,8 +552,6 @@ rule stability_page:
             ),
         ),
         template=str(ROOT / "workflow" / "report" / "stability.md.j2"),
-        library=library("validation.pages"),
-        figure=library("validation.figures.stability_maps"),
     output:
         table="{folder}/stability.csv",
         png="{folder}/images/stability_maps.png",
@@ -571,6 +568,9 @@ rule stability_page:
     resources:
         mem_mb=1000,
         runtime=5,
+    params:
+        library=library("validation.pages"),
+        figure=library("validation.figures.stability_maps"),
     message:
         "page on stability"
     script:

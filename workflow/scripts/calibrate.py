@@ -9,13 +9,13 @@ from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output) as log:
     task = Task.from_params(snakemake.params.calibration)
-    records = [read_record(Path(file)) for file in snakemake.input.rounds]
-    visited = [name for made in records for name in made["points"]]
+    made = [read_record(Path(file)) for file in snakemake.input.rounds]
+    visited = [name for one in made for name in one["points"]]
     simulated = task.simulate(visited, Path(snakemake.params.packings), snakemake.input.csds)
     outcome = conclude(task.settings, task.observations, simulated)
     for finding in outcome.findings:
         log.info("%s: %s", finding.kind, finding.text)
-    record = rounds.summary(outcome, task.settings, records[-1]["why"])
+    record = rounds.summary(outcome, task.settings, made[-1]["why"])
     record["prediction_points"] = list(prediction_points(task.settings, task.candidates, outcome.fit))
     tables = {
         "parity": rounds.parity_table(outcome, task.settings, task.observations),

@@ -10,10 +10,9 @@ from filtercake.packing.pack import pack_replicates
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.scene import Scene
 from filtercake.run.job import Progress, job
-from filtercake.run.provenance import code_hash
 
 
-def main(table, sources, asked, manifest, point, logger):
+def main(table, asked, manifest, point, logger):
     """Pack and report each replicate as it comes."""
     progress = Progress()
 
@@ -30,11 +29,10 @@ def main(table, sources, asked, manifest, point, logger):
         progress.note(f"{point} {line}")
 
     _, truncated = from_table(pd.read_csv(table))
-    code = code_hash([Path(source) for source in sources])
     # sizes as the table has them: what is packed is what the resistance is computed for
     scene = replace(Scene.from_dict({**asked.scene, **asked.incidental}), csd=truncated)
     enough = UntilNarrow(scene, asked.interval, asked.replicates) if asked.interval else lambda _: False
-    pack_replicates(scene, asked.most, Path(manifest).parent, code, report, note, enough)
+    pack_replicates(scene, asked.most, Path(manifest).parent, asked.code, report, note, enough)
     if asked.interval:
         note(f"interval {enough.half_width:.2g} after {len(enough.values)} packings, {asked.interval:g} asked for")
 
@@ -42,7 +40,6 @@ def main(table, sources, asked, manifest, point, logger):
 with job(snakemake.log[0], snakemake.output) as log:
     main(
         snakemake.input.csd,
-        [*snakemake.input.library, *snakemake.input.templates],
         snakemake.params,
         snakemake.output[0],
         snakemake.wildcards.point,

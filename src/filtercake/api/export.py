@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from filtercake.api.pack import code_of
 from filtercake.api.steps import PackingPorosity, porosity
 from filtercake.crystals.csd import FullAndTruncated, from_table, to_table
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
@@ -21,7 +20,7 @@ from filtercake.packing.pack import MANIFEST, cloud_seed, pack
 from filtercake.packing.result import read_record, write_json
 from filtercake.packing.scene import Scene, stage_seed
 from filtercake.packing.settling import StopRule
-from filtercake.run.provenance import ROOT, describe
+from filtercake.run.provenance import ROOT, describe, packing_code
 from filtercake.study import engine_choice
 from filtercake.study.config.values import NAME
 from filtercake.study.loading import LoadedStudy, load_study
@@ -179,7 +178,7 @@ def _write(
         "outcome": outcome,
         "scene": scene.as_dict(),
         "seeds": {"base": scene.seed, "cloud": seed, "engine": stage_seed(seed, "engine")},
-        "code": code_of(scene.engine),
+        "code": packing_code(scene.engine),
     }
     write_json(folder / INPUT, found)
     write_json(folder / "versions.json", {**describe(ROOT), "engine": _engine_words(scene.engine)})

@@ -12,13 +12,12 @@ from typing import Any
 import pandas as pd
 
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
-from filtercake.errors import ConfigError, Problem
-from filtercake.packing.engines.liggghts import template_folder
-from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates
+from filtercake.errors import ConfigError, PackingRejected, Problem
+from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates, point_key
 from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.result import write_json
+from filtercake.packing.result import read_sealed, write_json
 from filtercake.results.replicates import REPLICATE_COLUMNS, replicate_rows, summarise
-from filtercake.run.provenance import code_hash, packing_sources, versions
+from filtercake.run.provenance import packing_code, versions
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
 from filtercake.study.points import Point, base_point
@@ -55,7 +54,9 @@ class Bed:
     warnings: tuple[str, ...]
 
 
-def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: None, **options: Any) -> Bed:
+def pack(
+    source: Distribution, folder: str | Path, *, say: Report = lambda _: None, replace: bool = False, **options: Any
+) -> Bed:
     """Pack spheres of a size distribution, and measure porosity and resistance.
 
     Packings that ``folder`` holds of the same arguments are kept, so that more of them, or a narrower interval, may be
@@ -69,6 +70,8 @@ def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: No
         Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
     say : callable
         Receives a line per packing.
+    replace : bool
+        Whether packings of other options, or of another version of the program, may be lost; an error otherwise.
     **options
         The keys of the configuration's blocks ``material`` and ``packing``.
 
@@ -88,6 +91,8 @@ def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: No
     csd = study.csds[name]
     # a resistance beyond floating point is found before the packings are made, not after
     resistance(source, porosity=0.01, density_kg_m3=point.scene.density, sphericity=study.model.material.sphericity)
+    if not replace:
+        _check_packings(path, point_key(packing_code(point.scene.engine), point.scene))
     outcomes = _make(point, path, say)
     sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
     rows = list(replicate_rows(point, outcomes, path, sizes, sphericity))
@@ -103,11 +108,6 @@ def pack(source: Distribution, folder: str | Path, *, say: Report = lambda _: No
     )
 
 
-def code_of(engine: str) -> str:
-    """Hash of the code and the decks behind packings by an engine."""
-    return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
-
-
 def _make(point: Point, folder: Path, say: Report) -> list[Outcome]:
     def report(outcome: Outcome, record: dict[str, Any]) -> None:
         if outcome.status == "ok":
@@ -115,7 +115,7 @@ def _make(point: Point, folder: Path, say: Report) -> list[Outcome]:
         else:
             say(f"r{outcome.replicate} failed: {outcome.reason}")
 
-    interval, code = point.porosity_ci95_target, code_of(point.scene.engine)
+    interval, code = point.porosity_ci95_target, packing_code(point.scene.engine)
     enough: Callable[[Path], bool] = lambda _: False  # noqa: E731 - the other branch is an object
     if interval is not None:
         enough = UntilNarrow(point.scene, interval, point.replicates)
@@ -145,3 +145,16 @@ def _check_folder(folder: Path) -> None:
     if foreign:
         allowed = f"must be new, empty, or a folder of packings; it holds {foreign[0]}"
         raise ConfigError([Problem(str(ORIGIN), "output", str(folder), allowed)])
+
+
+def _check_packings(folder: Path, key: str) -> None:
+    """Refuse a folder whose packings follow from anything else than ``key``; damaged ones are made again anyway."""
+    for path in sorted(folder.glob("r*.json")):
+        try:
+            same = read_sealed(path).get("key") == key
+        except (PackingRejected, OSError):
+            continue
+        if not same:
+            whose = f"holds {path.stem} of other options or of another version"
+            allowed = f"{whose}: choose another folder, or replace its packings"
+            raise ConfigError([Problem(str(ORIGIN), "output", str(folder), allowed)])

@@ -17,6 +17,7 @@ import numpy as np
 from filtercake import __version__, api
 from filtercake.calibration.measurements import FiltrationConditions
 from filtercake.cli import options as words
+from filtercake.cli.schema import study_template
 from filtercake.crystals.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
 from filtercake.packing.result import publish
@@ -39,6 +40,7 @@ Line = tuple[str, Any, str]
 Command = Callable[[argparse.Namespace], int]
 
 EXAMPLES = {
+    "template": "filtercake template --output mine.yaml",
     "csd": "filtercake csd --kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200",
     "pack": "filtercake pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 "
     "--porosity-ci95-target 0.003 --output packing",
@@ -109,6 +111,7 @@ def build_parser() -> words.Parser:
     _add_export(commands)
     _add_rerun(commands)
     _add_estimate(commands)
+    _add_template(commands)
     return parser
 
 
@@ -122,6 +125,12 @@ def _command(commands: Any, name: str, run: Command, text: str) -> words.Parser:
     parser.set_defaults(run=run, prog=parser.prog)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser
+
+
+def _add_template(commands: Any) -> None:
+    text = "Write a study with every key, its default and its meaning: the start of a study of your own."
+    parser = _command(commands, "template", _run_template, text)
+    parser.add_argument("--output", metavar="YAML", required=True, help="the new file")
 
 
 def _add_csd(commands: Any) -> None:
@@ -146,6 +155,7 @@ def _add_pack(commands: Any) -> None:
         help="receives the packings, r0.npz and r0.json and so on; those of an earlier call with the same options are "
         "kept. Default: packing",
     )
+    parser.add_argument("--replace", action="store_true", help="packings of other options in that folder may be lost")
 
 
 def _add_porosity(commands: Any) -> None:
@@ -211,6 +221,12 @@ def _add_estimate(commands: Any) -> None:
     parser.add_argument("--cluster", action="store_true", help="each point is started on a node of a cluster")
 
 
+def _run_template(options: argparse.Namespace) -> int:
+    with Path(options.output).open("x", encoding="utf-8") as stream:
+        stream.write(study_template())
+    return _print_json({"file": options.output}) if options.json else 0
+
+
 def _run_csd(options: argparse.Namespace) -> int:
     found = api.distribution(**words.source(options))
     table = to_table(found.full, found.truncated)
@@ -261,7 +277,7 @@ def _say_understood(options: argparse.Namespace, source: api.Distribution) -> No
 def _run_pack(options: argparse.Namespace) -> int:
     source = api.distribution(**words.source(options))
     asked = words.given(options, (*Material.model_fields, *Packing.model_fields))
-    found = api.pack(source, options.output, say=_say, **asked)
+    found = api.pack(source, options.output, say=_say, replace=options.replace, **asked)
     _say_understood(options, source)
     for warning in found.warnings:
         _say(f"warning: {words.with_flags(warning, vars(options))}")

@@ -143,6 +143,8 @@ def unknown(words: list[str], known: Iterable[str]) -> str:
 
 
 def _problem_in_words(problem: Problem, known: set[str]) -> str:
+    if problem.file != str(ORIGIN):  # in a file, whose keys are no options
+        return str(problem)
     name = _option_of(problem.key, known)
     allowed_ = problem.allowed
     if problem.key == "distribution":

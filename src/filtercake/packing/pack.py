@@ -177,7 +177,7 @@ def pack_replicates(
     folder : Path
         Receives r<k>.npz, r<k>.json and the manifest.
     report : callable
-        Receives every outcome and its record.
+        Receives the outcome of every packing that is made, and its record.
     enough : callable
         Called with the geometry file of every accepted packing; says whether no further one is needed.
 
@@ -186,23 +186,31 @@ def pack_replicates(
     EngineMissing
         If the engine is not installed: no replicate could be made.
     """
-    key = digest(code, scene.decisive())
+    key = point_key(code, scene)
     engine = get_engine(scene.engine)
     work = folder / WORK
     shutil.rmtree(work, ignore_errors=True)
     outcomes = []
     for replicate in range(replicates):
         npz = folder / f"r{replicate}.npz"
-        outcome, record = finished(npz, key, replicate) or (None, {})
-        if outcome is None:
+        kept = finished(npz, key, replicate)
+        if kept is not None:
+            outcome = kept[0]
+            progress(f"r{replicate} is kept")
+        else:
             outcome, record = _attempt(scene, replicate, npz, key, engine, work, progress)
-        report(outcome, record)
+            report(outcome, record)
         outcomes.append(outcome)
         if outcome.status == "ok" and enough(npz):
             break
     shutil.rmtree(work, ignore_errors=True)
     write_json(folder / MANIFEST, sealed({"key": key, "replicates": [vars(outcome) for outcome in outcomes]}))
     return outcomes
+
+
+def point_key(code: str, scene: Scene) -> str:
+    """Hash of all that a point's packings follow from."""
+    return digest(code, scene.decisive())
 
 
 def finished(npz: Path, key: str, replicate: int) -> tuple[Outcome, dict[str, Any]] | None:
@@ -215,6 +223,17 @@ def finished(npz: Path, key: str, replicate: int) -> tuple[Outcome, dict[str, An
         return None
     outcome = Outcome(replicate, "ok", "", record["seed"], record["sha256"], record["attempts"])
     return outcome, record
+
+
+def count_kept(folder: Path, key: str, replicates: int) -> int:
+    """Count the replicates that will be kept, by their records alone, which is quick."""
+    count = 0
+    for replicate in range(replicates):
+        try:
+            count += read_sealed(folder / f"r{replicate}.json").get("key") == key
+        except (PackingRejected, OSError):
+            continue
+    return count
 
 
 def whole(manifest: Path) -> bool:

@@ -27,11 +27,22 @@ def worth_reading(record: logging.LogRecord) -> bool:
     return record.levelno > logging.INFO or not record.getMessage().startswith(CHATTER)
 
 
-def plan(points: Points, packings: int) -> str:
-    """One line about what a run is about to do."""
-    engines = sorted({point.scene.engine for group in points.values() for point in group.values()})
+def plan(points: Points, missing: Mapping[str, Mapping[str, int]]) -> str:
+    """One line about what a run is about to do.
+
+    Parameters
+    ----------
+    points : mapping
+        Points by study and name, all of the run.
+    missing : mapping
+        Packings to make, by study and name of the points that are to be made or completed.
+    """
+    engines = sorted({points[study][name].scene.engine for study, group in missing.items() for name in group})
     total = sum(len(group) for group in points.values())
-    return f"filtercake: {', '.join(points)}: {total} points, {packings} packings to make with {', '.join(engines)}"
+    making = sum(len(group) for group in missing.values())
+    packings = sum(sum(group.values()) for group in missing.values())
+    by = f" with {', '.join(engines)}" if packings else ""
+    return f"filtercake: {', '.join(points)}: {making} of {total} points, {packings} packings to make{by}"
 
 
 def failed_packings(folder: Path, points: Iterable[str]) -> Iterator[tuple[str, int, str]]:
@@ -45,18 +56,35 @@ def failed_packings(folder: Path, points: Iterable[str]) -> Iterator[tuple[str, 
 
 
 def success(results: Path, points: Points) -> str:
-    """Places of every study's figures and tables, and its failed packings, in words."""
+    """Say what a calibration found, where every study's figures and tables are, and which packings failed."""
     lines = []
     for study, group in points.items():
         folder = results / study
-        lines.append(f"\n{study}: figures in {folder / 'figures'}, tables in {folder / 'tables'}")
-        lines.append(f"{study}: numbers in {folder / 'summary.csv'}")
+        made = {"figures": folder / "figures", "tables": folder / "tables", "numbers": folder / "summary.csv"}
+        answer = folder / "calibration.json"
+        if answer.exists():
+            made["numbers"] = answer
+            lines += ["", *(f"{study}: {line}" for line in _answer(answer))]
+        places = ", ".join(f"{what} in {path}" for what, path in made.items() if path.exists())
+        lines.append(f"{study}: {places}" if places else f"{study}: packings in {folder / 'packings'}")
         failed = list(failed_packings(folder, group))
         if failed:
-            lines.append(f"{len(failed)} packings failed (status failed in {folder / 'replicates.csv'}; make retry):")
+            table = folder / "replicates.csv"
+            where = f"status failed in {table}; " if table.exists() else ""
+            lines.append(f"{len(failed)} packings failed ({where}make retry):")
         lines += [f"  {point} r{replicate}: {reason}" for point, replicate, reason in failed[:SHOWN]]
         lines += [f"{study}: {line}" for line in _wide_intervals(folder / "summary.csv")]
     return "\n".join(lines)
+
+
+def _answer(file: Path) -> Iterator[str]:
+    """Say what a calibration found, and what must be known of it."""
+    record = json.loads(file.read_text(encoding="utf-8"))
+    at = "" if record["friction"] is None else f", at a friction of {record['friction']:g}"
+    for name, found in record["parameters"].items():
+        yield f"{name} = {found['value']:.3g} (95 %: {found['low']:.3g} to {found['high']:.3g}){at}"
+    for finding in record["findings"]:
+        yield f"{finding['kind']}: {finding['text']}"
 
 
 def _wide_intervals(summary: Path) -> Iterator[str]:

@@ -7,12 +7,14 @@ import inspect
 import platform
 import re
 import subprocess
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from filtercake import __version__
 from filtercake.packing.engines import ENGINES
+from filtercake.packing.engines.liggghts import template_folder
 from filtercake.packing.result import sha256
 from filtercake.packing.scene import digest
 
@@ -26,7 +28,8 @@ PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "scikit-learn", "
 def sources(module: str) -> tuple[Path, ...]:
     """List the library's own files that a module (``packing.pack``) depends on, itself included, sorted.
 
-    Snakemake does not see imports: rules name these files as inputs, so that an edit reruns what depends on it.
+    Snakemake does not see imports: rules take the :func:`code_hash` of these files as a parameter, so that an edit
+    reruns what depends on it.
 
     Raises
     ------
@@ -71,9 +74,45 @@ def _closure(start: Path, closed: Path | None = None) -> set[Path]:
     return found
 
 
-def code_hash(files: tuple[Path, ...] | list[Path]) -> str:
-    """Hash of the contents of files, independent of where they lie."""
-    return digest(sorted((path.name, sha256(path)) for path in files))
+def packing_code(engine: str) -> str:
+    """Hash of the code and the deck templates behind packings by an engine.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such engine.
+    """
+    return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
+
+
+def code_hash(files: Iterable[Path]) -> str:
+    """Hash of what files mean, independent of where they lie: comments and docstrings of Python are no part of it."""
+    return digest(
+        sorted(
+            (path.name, _meaning(path.read_text(encoding="utf-8")) if path.suffix == ".py" else sha256(path))
+            for path in files
+        )
+    )
+
+
+@cache
+def _meaning(source: str) -> str:
+    """Hash the syntax tree of Python source, without the strings that stand alone: they do nothing."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        for name in ("body", "orelse", "finalbody"):
+            block = getattr(node, name, None)
+            if isinstance(block, list):
+                setattr(node, name, [statement for statement in block if not _is_text(statement)])
+    return digest(ast.dump(tree, annotate_fields=False))
+
+
+def _is_text(statement: ast.AST) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
 
 
 def versions() -> dict[str, str]:

@@ -23,6 +23,7 @@ from filtercake.packing.result import TEMPORARY
 from filtercake.run import checksums
 from filtercake.run.job import FOLDER_VARIABLE
 from filtercake.run.retry import forget, forget_failures
+from filtercake.study.config.study import Workflow
 from filtercake.study.loading import load_workflow
 from filtercake.user_files import read_yaml
 
@@ -148,7 +149,7 @@ def unverified(noted: Path) -> list[Path]:
 
 
 def results_folder(arguments: list[str]) -> Path:
-    """Folder of the results: ``results=...`` among the arguments, or what the workflow's configuration says.
+    """Folder of the results: ``results=...`` among the arguments, what the folder's configuration says, or the default.
 
     Raises
     ------
@@ -158,11 +159,15 @@ def results_folder(arguments: list[str]) -> Path:
     for argument in arguments:
         if argument.startswith("results="):
             return Path(argument.removeprefix("results="))
+    if not Path(CONFIG_FILE).exists():  # the workflow was started from elsewhere, with its own
+        return Path(Workflow.model_fields["results"].default)
     return Path(load_workflow(read_yaml(Path(CONFIG_FILE)), CONFIG_FILE).results)
 
 
 def main(arguments: list[str]) -> None:
     """Prepare the working directory and become Snakemake."""
+    if any(argument.split("=")[0] in ("--directory", "-d") for argument in arguments):
+        sys.exit("filtercake cannot resume: start it in the folder that --directory names, without --directory")
     folder = Path.cwd()
     state = folder / ".snakemake"
     state.mkdir(exist_ok=True)

@@ -142,11 +142,18 @@ def job_seconds(point: Point, start: float = START_SECONDS) -> float:
     return start + packings_of(point) * packing_seconds(point.scene) / parallelism(point.scene)
 
 
-def walltime_minutes(point: Point, attempt: int = 1) -> int:
-    """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry."""
+def walltime_minutes(point: Point, attempt: int = 1, *, granted: int = LONGEST_MINUTES) -> int:
+    """Return the walltime to ask for, min: four times the estimate for the most packings, doubled with every retry.
+
+    A submission, in which other points may wait for this one, asks for no more than is ``granted`` (min).
+    """
+    longest = granted // group_size(point, granted=granted)
+    return min(_first_walltime(point) << (attempt - 1), longest)
+
+
+def _first_walltime(point: Point) -> int:
     most = point.most_replicates * packing_seconds(point.scene) / parallelism(point.scene)
-    first = math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
-    return min(LONGEST_MINUTES, first << (attempt - 1))
+    return math.ceil(START_MINUTES + WALLTIME_FACTOR * most / MINUTE)
 
 
 def memory_mb(scene: Scene) -> int:
@@ -154,12 +161,17 @@ def memory_mb(scene: Scene) -> int:
     return math.ceil(BASE_MB + SPHERE_MB * scene.particles)
 
 
-def group_size(point: Point) -> int:
-    """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one."""
+def group_size(point: Point, *, granted: int = LONGEST_MINUTES) -> int:
+    """Return how many points like this one make a submission to a cluster worth its start-up; 1 for a long one.
+
+    The walltimes of all of them together stay within what is ``granted`` (min).
+    """
     if parallelism(point.scene) > 1:
         return 1
     minutes = job_seconds(point, START_SECONDS + NODE_SECONDS) / MINUTE
-    return next((size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES), 1)
+    walltime = _first_walltime(point)
+    fitting = (size for size in GROUP_SIZES if size * minutes <= SUBMISSION_MINUTES and size * walltime <= granted)
+    return next(fitting, 1)
 
 
 def estimate(points: Iterable[Point], *, on_cluster: bool = False) -> Estimate:

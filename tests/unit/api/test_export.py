@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtercake.api.pack import code_of
 from filtercake.cli.commands import main
 from filtercake.crystals.csd import to_table
 from filtercake.packing.pack import pack_replicates
 from filtercake.packing.result import Packing
+from filtercake.run.provenance import packing_code
 from filtercake.study import engine_choice
 from filtercake.study.loading import load_study
 from filtercake.study.points import Point, expand
@@ -43,7 +43,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Point]:
     path, point = write_study(home, "embedded")
     csd, results = load_study(path).csds["mine"], home / "results" / "tiny"
     folder = results / "packings" / point.name
-    pack_replicates(point.scene, 1, folder, code_of("embedded"))
+    pack_replicates(point.scene, 1, folder, packing_code("embedded"))
     manifest = json.loads((folder / "replicates.json").read_text())
     lost = {"replicate": 1, "status": "failed", "reason": "the bed exploded", "seed": 3, "sha256": "", "attempts": 1}
     manifest["replicates"].append(lost)

@@ -22,6 +22,7 @@ from filtercake.cli import commands as cli
 from filtercake.cli.commands import build_parser, main
 from filtercake.errors import ConfigError, PackingRejected
 from filtercake.packing.pack import Outcome
+from filtercake.study.loading import load_study
 
 PMMA = ["--mixture", "20:0.5,50:0.5"]
 ALUM = ["--kinetics", "ammonium_alum", "--residence-time-min", "15", "--slurry-concentration-kg-m3", "200"]
@@ -209,6 +210,33 @@ def test_pack_prints_what_porosity_and_resistance_find_in_its_files(packed: Path
         alphas.append(as_json(["resistance", "--porosity", str(item["porosity"]), *law], capsys)["resistance_m_kg"])
     assert found["resistance_m_kg"] == pytest.approx(np.mean(alphas))
     assert json.loads((packed / "summary.json").read_text())["porosity"] == found["porosity"]
+
+
+def test_packings_of_other_options_are_not_lost_unasked(packed: Path, tmp_path: Path, capsys: Capture) -> None:
+    folder = tmp_path / "bed"
+    shutil.copytree(packed, folder)
+    (folder / "replicates.json").unlink()  # as after a run that was stopped
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    other = ["pack", *BED, "--friction", "0.1", "--replicates", "1", "--output", str(folder)]
+    said = complaint(other, capsys)
+    assert "bed" in said and "r0 of other options" in said and "replace" in said
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert main([*other, "--replace"]) == 0
+    assert (folder / "r0.npz").read_bytes() != before["r0.npz"]
+
+
+def test_a_template_is_a_study(tmp_path: Path, capsys: Capture) -> None:
+    file = tmp_path / "mine.yaml"
+    assert main(["template", "--output", str(file)]) == 0
+    assert load_study(file).name == "mine"
+    assert "mine.yaml" in complaint(["template", "--output", str(file)], capsys)
+
+
+def test_a_problem_in_a_file_names_the_file(tmp_path: Path, capsys: Capture) -> None:
+    study = tmp_path / "no such study.yaml"
+    assert f"{study}: (file): cannot be read" in complaint(["estimate", str(study)], capsys)
+    study.write_text("material: {density_kg_m3: 1180, poisson_ratio: 7}\n")
+    assert f"{study}: material.poisson_ratio = 7: must be" in complaint(["estimate", str(study)], capsys)
 
 
 def test_the_profile_adds_up_to_the_spheres(packed: Path) -> None:

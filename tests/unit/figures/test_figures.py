@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -511,3 +514,20 @@ class TestFooter:
     )
     def test_counts(self, n: list[int], failed: list[int], engines: list[str], said: str) -> None:
         assert style.describe_counts(pd.DataFrame({"n": n, "n_failed": failed, "engine": engines})) == said
+
+
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "none_such", "svg"])
+@pytest.mark.parametrize("room", ["figures.catalogue", "validation.figures.growth"])
+def test_a_backend_that_is_not_there_changes_nothing(backend: str, room: str, tmp_path: Path) -> None:
+    code = f"""
+import filtercake.{room}, os
+from pathlib import Path
+from matplotlib.figure import Figure
+from filtercake.figures.catalogue import save
+save(Figure(), Path("x.png"), Path("x.pdf"))
+assert os.environ["MPLBACKEND"] == {backend!r}
+"""
+    environment = {**os.environ, "MPLBACKEND": backend}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "x.png").stat().st_size > 0

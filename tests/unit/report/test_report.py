@@ -115,6 +115,12 @@ def test_every_figure_has_a_caption_with_n_and_engine(
     assert len(caption) > 300
 
 
+@pytest.mark.parametrize("figure", ["fig09_porosity_vs_cohesion", "fig10_resistance_vs_cohesion"])
+def test_captions_say_that_markers_are_shifted(figure: str, made_up: StudyData, tmp_path: Path) -> None:
+    caption, _ = written(tmp_path, figure, captions.study_values(made_up))
+    assert "at one cohesion are shifted sideways" in caption
+
+
 def test_captions_hold_the_numbers_of_the_tables(made_up: StudyData, alum: StudyData, tmp_path: Path) -> None:
     caption, front = written(tmp_path, "fig09_porosity_vs_cohesion", captions.study_values(made_up))
     row = made_up.summary.set_index("point").loc["s0"]

@@ -128,6 +128,24 @@ def test_a_hash_follows_contents_not_places(tmp_path: Path) -> None:
     assert code_hash([b]) != first
 
 
+def test_a_hash_is_of_what_code_means(tmp_path: Path) -> None:
+    file = tmp_path / "a.py"
+    plain = "def f(x):\n    y = x\n    return y\n"
+    file.write_text(plain, encoding="utf-8")
+    first = code_hash([file])
+    for same in (
+        "# why\n" + plain,
+        '"""What."""\n\n\n' + plain,
+        plain.replace("    y", '    """Say."""\n    y'),
+        plain.replace("y = x", "y = (\n        x  # here\n    )"),
+    ):
+        file.write_text(same, encoding="utf-8")
+        assert code_hash([file]) == first
+    for other in (plain.replace("return y", "return x"), plain + "F = 1\n", plain.replace("x", "z")):
+        file.write_text(other, encoding="utf-8")
+        assert code_hash([file]) != first
+
+
 def test_versions_name_every_package_even_a_missing_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(provenance, "PACKAGES", ("numpy", "no-such-package-at-all"))
     found = versions()

@@ -163,6 +163,20 @@ def test_short_points_share_a_submission_and_long_ones_do_not(
     assert sizes == [GROUP_SIZES[0], GROUP_SIZES[1], 1]
 
 
+@pytest.mark.parametrize("granted", [5, 20, 60, 240])
+@pytest.mark.parametrize("replicates", [1, 30])
+def test_a_submission_asks_for_no_more_than_is_granted(
+    granted: int, replicates: int, point_of: Callable[..., Point]
+) -> None:
+    point = point_of(replicates=replicates)
+    size = group_size(point, granted=granted)
+    whole = min(walltime_minutes(point), granted)
+    for attempt in (1, 2, 3):
+        asked = walltime_minutes(point, attempt, granted=granted)
+        assert asked >= whole  # a smaller group is no reason for less time
+        assert size * asked <= granted
+
+
 def test_the_profile_knows_every_size_of_group() -> None:
     profile = yaml.safe_load((REPOSITORY / "profiles" / "slurm" / "profile.yaml").read_text(encoding="utf-8"))
     assert {f"packing_{size}={size}" for size in GROUP_SIZES} <= set(profile["group-components"])

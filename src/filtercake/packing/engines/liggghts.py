@@ -39,9 +39,12 @@ _COLUMNS = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
 
 
 def template_folder() -> Path:
-    """Folder of the deck templates: the checkout's ``liggghts_templates``, or the one an environment variable names."""
+    """Folder of the deck templates: the one an environment variable names, or the package's own.
+
+    In a checkout the package's is a link to ``liggghts_templates``; an installed package has a copy.
+    """
     named = os.environ.get(TEMPLATE_FOLDER_VARIABLE)
-    return Path(named) if named else Path(__file__).resolve().parents[4] / "liggghts_templates"
+    return Path(named) if named else Path(__file__).with_name("decks")
 
 
 def find_executable() -> str | None:
