@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "data"))
 
 from force_scenes import EVERY, LENGTH_UM, REFERENCES, SCENES
 
-from filtercake.packing.engines.embedded import Bed
+from filtercake.packing.engines.embedded_bed import Bed
 
 
 def trajectory(scene):

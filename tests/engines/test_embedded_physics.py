@@ -12,7 +12,8 @@ from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud, make_cloud
 from filtercake.packing.contacts import find_contacts
 from filtercake.packing.engines.base import SettleRequest
-from filtercake.packing.engines.embedded import Bed, Embedded
+from filtercake.packing.engines.embedded import Embedded
+from filtercake.packing.engines.embedded_bed import Bed
 from filtercake.packing.pack import pack
 from filtercake.packing.scene import Scene
 from filtercake.packing.settling import StopRule

@@ -1,6 +1,8 @@
 """What the embedded engine leaves out changes nothing: spheres in free fall, neighbour lists, and a stop halfway."""
 
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -142,6 +144,28 @@ def test_a_damaged_state_is_as_none(tmp_path: Path, damage):
     assert np.array_equal(Embedded().settle(request(cloud, scene, tmp_path)).position, undisturbed.position)
 
 
+def test_a_state_of_another_number_of_threads_is_refused():
+    cloud = make_cloud(CSD, 60, SCENE.initial_void_fraction, 1)
+    saved = Bed.from_cloud(cloud, SCENE, threads=2).saved()
+    with pytest.raises(ValueError, match="another number of threads"):
+        Bed.from_cloud(cloud, SCENE).restore(saved)
+
+
+def test_a_second_process_compiles_no_kernel_anew():
+    """A loop compiled anew in every process costs each seconds, and nothing else shows it."""
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from test_embedded_waking import CSD, SCENE, Bed, make_cloud\n"
+        "bed = Bed.from_cloud(make_cloud(CSD, 20, SCENE.initial_void_fraction, 1), SCENE)\n"
+        "bed.advance(20_000)\n"
+        "print(*(sum(kernel.stats.cache_misses.values()) for kernel in (bed.kernel, bed.find_pairs)))\n"
+    )
+    command = [sys.executable, "-c", code, str(Path(__file__).parent)]
+    for _ in range(2):  # the first fills the cache, unless it is full
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["0", "0"]
+
+
 def test_reports_say_how_many_are_down_and_when_it_ends(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.0)
     cloud = make_cloud(CSD, SCENE.particles, SCENE.initial_void_fraction, 1)
@@ -157,7 +181,7 @@ def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, mon
     clock = [0.0]
     cloud = make_cloud(CSD, SCENE.particles, SCENE.initial_void_fraction, 1)
     scene = replace(SCENE, time_step=0.25e-6)
-    advance = embedded.Bed.advance
+    advance = Bed.advance
     lines = []
 
     def timed(bed, steps):
@@ -165,9 +189,9 @@ def test_compiling_the_engine_does_not_lengthen_the_forecast(tmp_path: Path, mon
         advance(bed, steps)
 
     monkeypatch.setattr(embedded.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(embedded.Bed, "advance", timed)
+    monkeypatch.setattr(Bed, "advance", timed)
     monkeypatch.setattr(embedded, "PROGRESS_SECONDS", 0.5)
-    run = embedded._Run(request(cloud, scene, tmp_path, lines.append), embedded.Bed.from_cloud(cloud, scene, 1))
+    run = embedded._Run(request(cloud, scene, tmp_path, lines.append), Bed.from_cloud(cloud, scene, 1))
     run.settle()
     took = clock[0] - 1000.0  # a second a check
     forecasts = [re.search(r"about (\d+) (min|s) left", line).groups() for line in lines]

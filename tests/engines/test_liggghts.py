@@ -230,7 +230,9 @@ def test_the_published_protocol_runs_and_is_accepted(
 ) -> None:
     # a fifth of its steps is 13 ms of physical time, twice the fall of this small bed
     scene = dataclasses.replace(scene, engine="liggghts_as_published")
-    made = pack(scene, 0, tmp_path, engine=LiggghtsAsPublished(steps=30_000))
+    engine = LiggghtsAsPublished()
+    engine.fixed_steps = 30_000
+    made = pack(scene, 0, tmp_path, engine=engine)
     assert made.diagnostics["engine"] == "liggghts_as_published"
     assert made.diagnostics["steps"] == 30_001  # one step inserts
     # it draws its own spheres, and LIGGGHTS inserts fewer than asked: 77 of 100 here

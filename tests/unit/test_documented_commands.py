@@ -47,7 +47,7 @@ from filtercake.cli.commands import build_parser, main
 from filtercake.crystals.crystallizer import load_kinetics
 from filtercake.errors import ConfigError
 from filtercake.study import engine_choice
-from filtercake.study.loading import load_study, load_workflow, read_yaml
+from filtercake.study.loading import load_study, load_workflow
 from filtercake.study.points import expand
 
 CLUSTER = "docs/cluster.md"
@@ -296,7 +296,7 @@ def load_piece(block: Block, root: Path) -> None:
     """Check a block of YAML that names no file: a whole calibration, or a piece of a study."""
     target = root / "config" / "studies" / "piece_of_a_page.yaml"
     write(Block(block.page, block.line, "yaml", block.text, str(target), False), root)
-    values = read_yaml(target)
+    values = yaml.safe_load(target.read_text(encoding="utf-8"))
     if set(values) <= set(Calibration.model_fields) and "measurements" in values:
         path = root / "config" / "calibrations" / "of_a_page.yaml"
         target.rename(path)

@@ -11,8 +11,10 @@ import pytest
 
 from filtercake.calibration.config import load_calibration
 from filtercake.calibration.measurements import load_measurements, read_test
+from filtercake.crystals.cells import LARGEST_FILE
 from filtercake.crystals.crystallizer import load_kinetics
-from filtercake.crystals.csd import LARGEST_FILE, MOST_CLASSES, read_csd
+from filtercake.crystals.csd import read_csd
+from filtercake.crystals.instruments import MOST_CLASSES
 from filtercake.errors import (
     MOST_SHOWN,
     ConfigError,
@@ -159,7 +161,9 @@ def test_too_many_points_or_distributions_are_refused(study_from: Callable[..., 
 def test_a_distribution_too_broad_for_any_bed_is_refused(
     study_from: Callable[..., LoadedStudy], good_study: str
 ) -> None:
-    broad = good_study.replace("size_um: 50", "size_um: 50000")
+    broad = good_study.replace("size_um: 50", "size_um: 50000").replace(
+        "material:", "material:\n  trust_units: true", 1
+    )
     with pytest.raises(ConfigError, match=r"csds.bimodal.mixture = 2 classes: needs .* spheres"):
         study_from(broad)
     assert study_from(broad.replace("sweeps:", "packing: {particles: 5000}\nsweeps:"))

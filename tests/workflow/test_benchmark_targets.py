@@ -19,7 +19,7 @@ JOBS = {
     "reference": ["gather_references"],
     "benchmark": ["time_variants", "choices", "coverage", "benchmark_page"],
     "stability": ["stress", "stability_page"],
-    "twin": ["repeat_calibrations"],
+    "twin": ["repeat_calibrations", "calibrate_apart"],
     "bed_size": ["compare_sizes"],
 }
 

@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from filtercake.results.tables import read_table
+
 CANARY = "canary"
 HOSTILE_FILES = (
     f"a b;$(touch {CANARY}).csv",
@@ -82,3 +84,35 @@ def test_aliases_that_multiply_are_refused_in_the_configuration(checkout):
     output = done.stdout + done.stderr
     assert done.returncode != 0 and "Traceback" not in output
     assert "aliases (*name) are not allowed here" in output
+
+
+def write_studies_like_numbers(checkout):
+    """Studies and distributions whose names YAML, Snakemake or pandas take for numbers or for nothing."""
+    for study, csd in {"2024_05": "01", "007": "NA", "1e5": "nan", "nan": '"null"'}.items():
+        sizes = "[{size_um: 30, volume_fraction: 0.5}, {size_um: 50, volume_fraction: 0.5}]"
+        settings = "{engine: embedded, particles: 200, replicates: 2}"
+        text = f"csds:\n  {csd}: {{mixture: {sizes}}}\nmaterial: {{density_kg_m3: 1180}}\npacking: {settings}\n"
+        text += f"sweeps: [{{csd: [{csd}], cohesion_kJ_m3: [0, 50]}}]\n"
+        (checkout.root / "config/studies" / f"{study}.yaml").write_text(text)
+
+
+@pytest.mark.parametrize("study", ["2024_05", "007", "1e5", "nan"])
+def test_a_study_with_a_name_like_a_number_is_planned(checkout, study):
+    write_studies_like_numbers(checkout)
+    done = checkout.snakemake("--dry-run", "--config", f"studies={study}")
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert f"of {study}" in done.stdout
+
+
+@pytest.mark.slow
+def test_studies_with_names_like_numbers_run(checkout):
+    write_studies_like_numbers(checkout)
+    (checkout.root / "config/config.yaml").write_text("studies: [2024_05, 007, 1e5, nan]\n")
+    done = checkout.snakemake(timeout=3000)
+    assert done.returncode == 0, done.stderr + done.stdout
+    for study, csd in {"2024_05": "01", "007": "NA", "1e5": "nan", "nan": "null"}.items():
+        results = checkout.root / "results" / study
+        summary = read_table(results / "summary.csv")
+        assert set(summary["study"]) == {study} and set(summary["csd"]) == {csd}
+        assert read_table(results / "tables/table1.csv")["label"].tolist() == [csd]
+        assert (results / "csd" / f"{csd}.csv").exists() and list((results / "figures").glob("fig10*.png"))

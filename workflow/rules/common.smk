@@ -17,7 +17,11 @@ from filtercake.run import console, slurm
 from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.run.provenance import code_hash, packing_code, sources
 from filtercake.study import engine_choice, estimate
-from filtercake.study.loading import find_studies, load_studies
+from filtercake.study.loading import (
+    find_studies,
+    load_studies,
+    with_names_as_written,
+)
 from filtercake.study.points import expand as expand_points
 from filtercake.units import MICROMETRE, MINUTE
 from snakemake.exceptions import WorkflowError
@@ -44,7 +48,11 @@ def points_by_name(studies):
 
 
 try:
-    settings = load_workflow(dict(config), CONFIG_FILE)
+    files = [CONFIG_FILE, *workflow.overwrite_configfiles]
+    named = with_names_as_written(
+        config, map(Path, files), workflow.config_settings.config_args or []
+    )
+    settings = load_workflow(named, CONFIG_FILE)
     STUDIES = {
         study.name: study
         for study in load_studies(find_studies(settings, STUDY_FILES, CONFIG_FILE))
@@ -139,8 +147,7 @@ def figures_of(study):
 def csd_params(wildcards):
     study = study_of(wildcards)
     csd, state = study.model.csds[wildcards.csd], study.csds[wildcards.csd].crystallizer
-    classes = [[item.size_um, item.volume_fraction] for item in csd.mixture or []]
-    found = {"classes": classes, "truncation": csd.truncation}
+    found = {**csd.recipe, "truncation": csd.truncation}
     if state is not None:
         found["size_scale_um"] = state.size_scale / MICROMETRE
         found["bin_width_um"] = study.model.crystallizer.bin_width_um
@@ -271,6 +278,11 @@ def announcement():
     lines = too_long()
     for name in points_of_run():
         lines += [f"warning: {warning}" for warning in KNOWN[name].warnings]
+        lines += [
+            f"{name}: {csd}: {item.file}: {item.full.understood}"
+            for csd, item in KNOWN[name].csds.items()
+            if item.file is not None
+        ]
     if points_of_run():
         lines.append(console.plan(points_of_run(), missing))
     if to_make:

@@ -17,7 +17,7 @@ rule csd:
         mem_mb=500,
         runtime=5,
     params:
-        library=library("crystals.crystallizer"),
+        library=library("crystals.crystallizer") + library("crystals.size_laws"),
         source=csd_params,
     message:
         "size distribution {wildcards.csd} of {wildcards.study}"

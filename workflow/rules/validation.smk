@@ -53,7 +53,13 @@ TWIN = {
     study.name: study
     for study in load_studies(
         ROOT / "config" / "benchmarks" / f"{name}.yaml"
-        for name in ("twin", "twin_truth", "twin_friction", "twin_friction_truth")
+        for name in (
+            "twin",
+            "twin_truth",
+            "twin_friction",
+            "twin_friction_truth",
+            "twin_discrepancy",
+        )
     )
 }
 KNOWN.update(TWIN)
@@ -63,6 +69,7 @@ KNOWN_POINTS.update(points_by_name(TWIN))
 rule twin:
     input:
         expand("{results}/benchmark/twin.csv", results=RESULTS),
+        expand("{results}/benchmark/twin_discrepancy.csv", results=RESULTS),
     localrule: True
 
 
@@ -99,6 +106,35 @@ rule repeat_calibrations:
         "twenty calibrations whose answer is known"
     script:
         "../scripts/twin.py"
+
+
+rule calibrate_apart:
+    input:
+        packings="{results}/twin_discrepancy/replicates.csv",
+        library=library("validation.twin"),
+    output:
+        "{results}/benchmark/twin_discrepancy.csv",
+    log:
+        "{results}/benchmark/logs/twin_discrepancy.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/twin_discrepancy.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        repeats=20,
+        tests=4,
+        noise=0.05,
+        truth=35.0,
+        discrepancy=0.2,
+        # four packings of a point, two for every other calibration
+        shares=2,
+    message:
+        "calibrations of distributions that no cohesion describes together"
+    script:
+        "../scripts/twin_discrepancy.py"
 
 
 # several beds held against one of the paper's own size; these two are users' studies, so that they may be other files
@@ -431,7 +467,7 @@ rule coverage:
     message:
         "an interval asked for, again and again"
     script:
-        "../scripts/coverage.py"
+        "../scripts/interval_coverage.py"
 
 
 rule benchmark_page:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.validation.agreement import compare_engines
 
@@ -12,7 +13,7 @@ COLUMNS = ["study", "csd", "cohesion_kJ_m3", "friction", "engine", "replicate", 
 COLUMNS += ["porosity", "porosity_paper_count", "overlap_max", "coordination", "steps"]
 
 with job(snakemake.log[0], snakemake.output) as log:
-    replicates = pd.concat([pd.read_csv(path) for path in snakemake.input.replicates], ignore_index=True)
+    replicates = pd.concat([read_table(path) for path in snakemake.input.replicates], ignore_index=True)
     table = compare_engines(replicates, *snakemake.params.engines)
     log.info("\n%s", table.to_string())
     for output, made in ((snakemake.output.replicates, replicates[COLUMNS]), (snakemake.output.table, table)):

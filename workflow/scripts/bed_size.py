@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.validation.agreement import compare_sizes
 
 with job(snakemake.log[0], snakemake.output) as log:
-    table = compare_sizes(*(pd.read_csv(path) for path in snakemake.input.replicates))
+    table = compare_sizes(*(read_table(path) for path in snakemake.input.replicates))
     log.info("\n%s", table.to_string())
     with publish(Path(snakemake.output[0])) as temporary:
         table.to_csv(temporary, index=False)

@@ -6,17 +6,18 @@ import pandas as pd
 
 from filtercake.figures.style import applied, save
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.validation import pages
 from filtercake.validation.error_against_time import on_front
 from filtercake.validation.figures import run_time_error
 
 with job(snakemake.log[0], snakemake.output):
-    table = pd.concat([pd.read_csv(file) for file in snakemake.input.errors], ignore_index=True)
+    table = pd.concat([read_table(file) for file in snakemake.input.errors], ignore_index=True)
     table["on_front"] = table.groupby(["case", "estimator"], group_keys=False)[["axis", "n", "seconds", "error"]].apply(
         on_front
     )
-    references = pages.reference_table(pd.read_csv(snakemake.input.reference), snakemake.params.cases)
+    references = pages.reference_table(read_table(snakemake.input.reference), snakemake.params.cases)
     with publish(Path(snakemake.output.table)) as temporary:
         table.to_csv(temporary, index=False)
     with applied():
@@ -26,8 +27,8 @@ with job(snakemake.log[0], snakemake.output):
         Path(snakemake.input.template),
         table,
         references,
-        pd.read_csv(snakemake.input.choices),
-        pd.read_csv(snakemake.input.coverage),
+        read_table(snakemake.input.choices),
+        read_table(snakemake.input.coverage),
         Path(snakemake.params.data),
     )
     with publish(Path(snakemake.output.page)) as temporary:

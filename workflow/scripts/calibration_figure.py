@@ -2,20 +2,17 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.calibration.measurements import load_measurements
 from filtercake.figures.calibrated import CalibrationData
 from filtercake.figures.catalogue import draw
 from filtercake.figures.style import save
 from filtercake.packing.result import read_record
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 
-NAMES = {"csd": str, "point": str}
-
 with job(snakemake.log[0], snakemake.output):
-    tables = {Path(table).stem: pd.read_csv(table, dtype=NAMES) for table in snakemake.input.tables}
-    predictions = [pd.read_csv(table, dtype=NAMES) for table in snakemake.input.predictions]
+    tables = {Path(table).stem: read_table(table) for table in snakemake.input.tables}
+    predictions = [read_table(table) for table in snakemake.input.predictions]
     data = CalibrationData(
         name=snakemake.wildcards.calibration,
         title=snakemake.params.title,

@@ -2,26 +2,23 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.calibration.measurements import load_measurements
 from filtercake.figures.calibrated import CalibrationData
 from filtercake.packing.result import read_record
 from filtercake.report import captions, pages
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.run.provenance import describe
 from filtercake.study.config.study import Study
 
-NAMES = {"csd": str, "point": str}
-
 with job(snakemake.log[0]):
     folder = Path(snakemake.input.summary).parent
-    tables = {Path(table).stem: pd.read_csv(table, dtype=NAMES) for table in snakemake.input.tables}
+    tables = {Path(table).stem: read_table(table) for table in snakemake.input.tables}
     data = CalibrationData(
         name=snakemake.wildcards.calibration,
         title=snakemake.params.title,
         summary=read_record(Path(snakemake.input.summary)),
-        predictions=next((pd.read_csv(table, dtype=NAMES) for table in snakemake.input.predictions), None),
+        predictions=next((read_table(table) for table in snakemake.input.predictions), None),
         labels=dict(snakemake.params.labels),
         measurements=load_measurements(Path(snakemake.input.files[0])),
         **tables,

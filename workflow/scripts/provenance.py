@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.packing.result import write_json
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.run.provenance import describe
 
 with job(snakemake.log[0], snakemake.output):
-    replicates = pd.read_csv(snakemake.input.replicates)
+    replicates = read_table(snakemake.input.replicates)
     write_json(
         Path(snakemake.output[0]),
         {

@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import Progress, job
 from filtercake.study import engine_choice
 from filtercake.study.loading import load_study
@@ -26,7 +27,7 @@ with job(snakemake.log[0], snakemake.output) as log:
         ],
         ignore_index=True,
     )
-    reference = reference_of(pd.read_csv(snakemake.input.reference), case["reference"], case["friction"])
+    reference = reference_of(read_table(snakemake.input.reference), case["reference"], case["friction"])
     for output, table in (
         (snakemake.output.timings, timings),
         (snakemake.output.errors, errors(name, timings, reference)),

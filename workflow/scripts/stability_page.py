@@ -6,13 +6,14 @@ import pandas as pd
 
 from filtercake.figures.style import applied, save
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.validation import pages
 from filtercake.validation.figures import stability_maps
 from filtercake.validation.stability import with_fence
 
 with job(snakemake.log[0], snakemake.output):
-    table = with_fence(pd.concat([pd.read_csv(file) for file in snakemake.input.tables], ignore_index=True))
+    table = with_fence(pd.concat([read_table(file) for file in snakemake.input.tables], ignore_index=True))
     with publish(Path(snakemake.output.table)) as temporary:
         table.to_csv(temporary, index=False)
     with applied():

@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.packing.result import publish
 from filtercake.results.replicates import summarise
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 
 with job(snakemake.log[0], snakemake.output), publish(Path(snakemake.output[0])) as temporary:
-    summarise(pd.read_csv(snakemake.input.replicates)).to_csv(temporary, index=False)
+    summarise(read_table(snakemake.input.replicates)).to_csv(temporary, index=False)

@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.crystals.csd import read_tables
 from filtercake.packing.result import publish
 from filtercake.results.paper_tables import comparison, table1, table2, table4
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
 from filtercake.study.config.study import Study
 
@@ -16,8 +15,8 @@ with job(snakemake.log[0], snakemake.output):
     for output, table in (
         (snakemake.output.table1, table1(study, csds)),
         (snakemake.output.table2, table2(study, csds)),
-        (snakemake.output.table4, table4(study, csds, pd.read_csv(snakemake.input.summary))),
-        (snakemake.output.comparison, comparison(study, pd.read_csv(snakemake.input.replicates))),
+        (snakemake.output.table4, table4(study, csds, read_table(snakemake.input.summary))),
+        (snakemake.output.comparison, comparison(study, read_table(snakemake.input.replicates))),
     ):
         with publish(Path(output)) as temporary:
             table.to_csv(temporary, index=False)

@@ -5,18 +5,19 @@ from pathlib import Path
 import pandas as pd
 
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import job
-from filtercake.validation.twin import repeat_calibrations, summarise
+from filtercake.validation.twin import Experiment, repeat_calibrations, summarise
 
 with job(snakemake.log[0], snakemake.output) as log:
     pool, truth = (
-        pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
+        pd.concat([read_table(file) for file in files], ignore_index=True)
         for files in (snakemake.input.pool, snakemake.input.truth)
     )
-    asked = {name: snakemake.params[name] for name in ("repeats", "tests", "noise")}
+    count, asked = snakemake.params.repeats, Experiment(snakemake.params.tests, snakemake.params.noise)
     repeats = pd.concat(
         [
-            repeat_calibrations(pool[pool["friction"] == friction], truth[truth["friction"] == friction], **asked)
+            repeat_calibrations(pool[pool["friction"] == friction], truth[truth["friction"] == friction], count, asked)
             for friction in sorted(truth["friction"].unique())
         ],
         ignore_index=True,

@@ -1,11 +1,12 @@
 """The steps of a study as functions: the one import that a notebook needs.
 
 ``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`porosity`, :func:`profile`,
-:func:`resistance`, :func:`filter_area`, :func:`export` and :func:`rerun`. It may import from every room but ``cli``,
-``report`` and ``validation``.
+:func:`resistance`, :func:`filter_area`, :func:`filtration_test`, :func:`filtration_tests`, :func:`export` and
+:func:`rerun`. It may import from every room but ``cli``, ``report`` and ``validation``.
 """
 
 from filtercake.api.export import Exported, export, first_porosity, rerun
+from filtercake.api.filtration import FiltrationResult, filtration_test, filtration_tests
 from filtercake.api.pack import Bed, pack
 from filtercake.api.steps import (
     Distribution,
@@ -27,12 +28,15 @@ __all__ = [
     "Exported",
     "FilterOptions",
     "FilterSize",
+    "FiltrationResult",
     "PackingPorosity",
     "Resistance",
     "ResistanceOptions",
     "distribution",
     "export",
     "filter_area",
+    "filtration_test",
+    "filtration_tests",
     "first_porosity",
     "pack",
     "porosity",

@@ -7,7 +7,7 @@ same way; results have the names of the columns of ``summary.csv``. Examples are
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,8 +27,10 @@ from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
 from filtercake.packing.slab import bed_height
 from filtercake.results.filter_design import drum_filter
+from filtercake.study.config.crystals import Lognormal, RosinRammler
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.values import TO_NUMBER, Density, Model
+from filtercake.study.limits import unit_problems
 from filtercake.study.loading import LoadedStudy, check_study, parse
 from filtercake.units import HOUR, MICROMETRE
 
@@ -36,6 +38,8 @@ ORIGIN = Path("options")
 """Stands for the study file in messages about arguments; files that arguments name are looked up from here."""
 CSD = "csd"
 """Name of the distribution in the study of one point."""
+SOURCES = ("mixture", "file", "lognormal", "rosin_rammler", "kinetics")
+"""What a distribution may come from."""
 CRYSTALLIZER_OPTIONS = ("kinetics", "kinetics_file", "slurry_concentration_kg_m3", "bin_width_um")
 PLAIN_DENSITY = 1000.0
 """Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it, or from the spheres
@@ -162,6 +166,7 @@ class ResistanceOptions(Model):
     sphericity: Annotated[float, Field(ge=0.01, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1.0, description="Sphericity of the crystals."
     )
+    trust_units: bool = Field(default=False, description="Take density and sizes as they are, however unlikely.")
 
 
 class FilterOptions(Filter):
@@ -196,13 +201,14 @@ class FilterOptions(Filter):
 
 
 def distribution(**options: Any) -> Distribution:
-    """Make a crystal size distribution: a mixture, a CSV file, or a crystallizer's product.
+    """Make a crystal size distribution: a mixture, a file, a law of few numbers, or a crystallizer's product.
 
     Parameters
     ----------
     **options
         Exactly one of ``mixture`` (a mapping or pairs of sizes in um and volume fractions), ``file`` (a CSV with the
-        columns size_um, volume_fraction) and ``kinetics`` (with ``residence_time_min`` and
+        columns size_um, volume_fraction, or as a spreadsheet or an instrument writes it), ``lognormal`` (d10, d50 and
+        d90 in um), ``rosin_rammler`` (size in um and exponent) and ``kinetics`` (with ``residence_time_min`` and
         ``slurry_concentration_kg_m3``; ``kinetics_file``, ``bin_width_um``); besides,
         ``truncate_below_volume_fraction``, ``truncate_below_um`` and ``truncate_above_um``, which leave classes out
         of the packing.
@@ -218,7 +224,7 @@ def distribution(**options: Any) -> Distribution:
     28.57
     """
     options = {name: value for name, value in options.items() if value is not None}
-    material = {} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY}
+    material = {"trust_units": True, **({} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY})}
     study = load(options, material, {"particles": NARROW_PARTICLES})
     return _distribution(study, options)
 
@@ -231,7 +237,7 @@ def resistance(source: Distribution, **options: Any) -> Resistance:
     source : Distribution
         The size distribution; all of it counts, whatever is left out of the packing.
     **options
-        ``porosity``, ``density_kg_m3`` (not needed with kinetics), ``sphericity``.
+        ``porosity``, ``density_kg_m3`` (not needed with kinetics), ``sphericity``, ``trust_units``.
 
     Raises
     ------
@@ -242,6 +248,17 @@ def resistance(source: Distribution, **options: Any) -> Resistance:
     density = given.density_kg_m3 if given.density_kg_m3 is not None else source.density_kg_m3
     if density is None:
         raise ConfigError([_problem("density_kg_m3", "(missing)", "must be given")])
+    unlikely = () if given.trust_units else unit_problems(source.full, density)
+    problems = [
+        _problem(
+            "distribution" if finding.key == "sizes" else "density_kg_m3",
+            "" if finding.key == "sizes" else f"{density:g}",
+            f"{finding.text}; if the unit is right, say trust_units",
+        )
+        for finding in unlikely
+    ]
+    if problems:
+        raise ConfigError(problems)
     law = (given.porosity, source.full, density, given.sphericity)
     try:
         found = Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))
@@ -362,8 +379,7 @@ def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mappin
         study["crystallizer"] = {**mixer, **cut}
         study["sweeps"] = [{"residence_time_min": [source.get("residence_time_min")]}]
     else:
-        origin = {"file": str(source["file"])} if "file" in source else {"mixture": _classes(source["mixture"])}
-        study["csds"] = {CSD: {**origin, **cut}}
+        study["csds"] = {CSD: {**_origin(source), **cut}}
         study["sweeps"] = [{"csd": [CSD]}]
     with np.errstate(all="ignore"):
         try:
@@ -387,17 +403,18 @@ def _distribution(study: LoadedStudy, options: dict[str, Any]) -> Distribution:
 
 def _source_problems(source: Mapping[str, Any]) -> Sequence[Problem]:
     """Missing, surplus and contradictory arguments of a distribution."""
-    known = ("mixture", "file", "residence_time_min", *CRYSTALLIZER_OPTIONS)
+    known = (*SOURCES[:-1], "residence_time_min", *CRYSTALLIZER_OPTIONS)
     cuts = ("truncate_below_volume_fraction", "truncate_below_um", "truncate_above_um")
     problems = [
         _problem(name, repr(value), f"unknown option; allowed: {', '.join((*known, *cuts))}")
         for name, value in source.items()
         if name not in (*known, *cuts)
     ]
-    named = [name for name in ("mixture", "file", "kinetics") if name in source]
+    named = [name for name in SOURCES if name in source]
     if len(named) != 1:
         said = " and ".join(named) or "(missing)"
-        problems.append(_problem("distribution", said, "needs exactly one of mixture, file and kinetics"))
+        allowed = f"needs exactly one of {', '.join(SOURCES[:-1])} and {SOURCES[-1]}"
+        problems.append(_problem("distribution", said, allowed))
     elif named == ["kinetics"]:
         asked = [name for name in ("residence_time_min", "slurry_concentration_kg_m3") if name not in source]
         problems += [_problem(name, "(missing)", "must be given with kinetics") for name in asked]
@@ -405,6 +422,24 @@ def _source_problems(source: Mapping[str, Any]) -> Sequence[Problem]:
         idle = [name for name in ("residence_time_min", *CRYSTALLIZER_OPTIONS) if name in source]
         problems += [_problem(name, str(source[name]), "needs kinetics") for name in idle]
     return problems
+
+
+def _origin(source: Mapping[str, Any]) -> dict[str, Any]:
+    """Key of a study's distribution, with its value, from the arguments."""
+    for name, law in (("lognormal", Lognormal), ("rosin_rammler", RosinRammler)):
+        if name in source:
+            given = source[name]
+            keys = list(law.model_fields)
+            if isinstance(given, Mapping):
+                return {name: dict(given)}
+            if (
+                isinstance(given, (str, bytes))
+                or not isinstance(given, Iterable)
+                or len(values := list(given)) != len(keys)
+            ):
+                raise ConfigError([_problem(name, repr(given)[:60], f"must be {len(keys)} numbers: {', '.join(keys)}")])
+            return {name: dict(zip(keys, values, strict=True))}
+    return {"file": str(source["file"])} if "file" in source else {"mixture": _classes(source["mixture"])}
 
 
 def _classes(mixture: Any) -> list[dict[str, Any]]:

@@ -13,7 +13,6 @@ from pydantic import Field, model_validator
 
 from filtercake.calibration.fit import ADVISED_FRICTIONS, Finding, Observation, Parameter, advised_friction
 from filtercake.calibration.measurements import (
-    NORMAL95,
     Measurement,
     Measurements,
     compressibility_by_csd,
@@ -22,10 +21,12 @@ from filtercake.calibration.measurements import (
     same_pressure,
 )
 from filtercake.calibration.rounds import BATCHES, Candidate, Settings
+from filtercake.calibration.units_check import unit_problems
 from filtercake.errors import ConfigError, Problem, shown
 from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.filtration.resistance import implied_porosity
 from filtercake.packing import contact_law
+from filtercake.statistics import quantile
 from filtercake.study.config.packing import EngineName
 from filtercake.study.config.study import MOST_DISTRIBUTIONS, Workflow
 from filtercake.study.config.sweep import Sweep
@@ -312,7 +313,7 @@ def _observations(measurements: Measurements, pressure: float | None) -> Iterabl
     if pressure is not None:
         for csd, fit in _brought(measurements, pressure).items():
             value, _, high = (float(end) for end in fit.resistance_at(pressure * KILOPASCAL))
-            yield Observation(f"{csd} at {pressure:g} kPa", csd, math.log(value), math.log(high / value) / NORMAL95)
+            yield Observation(f"{csd} at {pressure:g} kPa", csd, math.log(value), math.log(high / value) / quantile())
     for item in _as_they_are(measurements, pressure):
         yield Observation(item.name, item.csd, math.log(item.resistance), item.relative_se)
 
@@ -367,6 +368,7 @@ def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements
     for index, name in enumerate(model.predict):
         if name not in study.csds:
             yield Problem(str(path), f"predict[{index}]", repr(name), f"not in the study; allowed: {known}")
+    yield from unit_problems(measurements, study, model.measurements)
     for csd, fit in _brought(measurements, model.pressure_kPa).items():
         if not math.isfinite(fit.exponent_ci95):
             text = f"two measurements of {csd} give no interval at another pressure: add a third, or leave the key out"

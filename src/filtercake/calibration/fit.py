@@ -15,16 +15,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from scipy import special
 
 from filtercake.calibration.pooling import Pool, improbable, pool
 from filtercake.errors import CalibrationError
+from filtercake.statistics import CONFIDENCE, effective_freedom, likelihood_limit, pooled_spread
 from filtercake.units import FloatArray
 
 if TYPE_CHECKING:
     from sklearn.gaussian_process import GaussianProcessRegressor
 
-CONFIDENCE = 0.95
 GRID = (801, 41)
 """Grid points of the cohesion and, where it is fitted, of the friction."""
 SHRINKAGE = 8.0
@@ -117,7 +116,7 @@ class Finding:
     ----------
     kind : str
         ``flat``, ``several``, ``edge``, ``zero``, ``soft``, ``confounded``, ``contradiction``, ``pressure``,
-        ``misfit`` or ``friction``.
+        ``misfit``, ``failed`` or ``friction``.
     text : str
         The same in a sentence.
     """
@@ -140,8 +139,9 @@ class Calibration:
         -2 ln(likelihood), less its smallest value.
     estimates : tuple of Estimate
         One per parameter.
-    threshold : float
-        Deviance up to which parameters belong to the 95 % interval of one of them.
+    scale, scale_freedom : float
+        Scale of the weighted squares that the interval goes by, and its degrees of freedom (infinite where the errors
+        are known).
     chi_square : float
         Weighted sum of squares at the best parameters, with the discrepancy left out.
     degrees_of_freedom : int
@@ -161,7 +161,8 @@ class Calibration:
     axes: tuple[FloatArray, ...]
     deviance: FloatArray
     estimates: tuple[Estimate, ...]
-    threshold: float
+    scale: float
+    scale_freedom: float
     chi_square: float
     degrees_of_freedom: int
     discrepancy: float
@@ -175,6 +176,11 @@ class Calibration:
     def best(self) -> tuple[float, ...]:
         """The best parameters."""
         return tuple(estimate.value for estimate in self.estimates)
+
+    @property
+    def threshold(self) -> float:
+        """Deviance up to which parameters belong to the 95 % interval of one of them."""
+        return self.scale * likelihood_limit(self.scale_freedom)
 
 
 @dataclass(frozen=True)
@@ -254,10 +260,10 @@ def _variances(samples: Sequence[FloatArray]) -> FloatArray:
     """Variance of one replicate at each point: its own, drawn towards that of all points."""
     freedom = np.array([values.size - 1.0 for values in samples])
     squares = np.array([float(np.sum((values - values.mean()) ** 2)) for values in samples])
-    if not freedom.sum() > 0.0:
+    pooled = pooled_spread(samples)
+    if not pooled.freedom > 0.0:
         raise CalibrationError("no point has two accepted packings: their spread is not known; ask for more replicates")
-    pooled = squares.sum() / freedom.sum()
-    return np.asarray((SHRINKAGE * pooled + squares) / (SHRINKAGE + freedom), dtype=np.float64)
+    return np.asarray((SHRINKAGE * pooled.sd**2 + squares) / (SHRINKAGE + freedom), dtype=np.float64)
 
 
 def calibrate(observations: Sequence[Observation], responses: Mapping[str, Response]) -> Calibration:
@@ -265,8 +271,13 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
 
     Maximum likelihood: weighted least squares in ln(alpha), the weights made of the measurements' errors and of the
     packings' own. Measurements of one distribution share the error of its packings. Where they contradict each other,
-    their scatter is added to the errors of each. Where the distributions scatter more than all this allows, a
-    discrepancy between measurements and packings, one per distribution, is estimated and added.
+    their scatter is added to the errors of each. Where the distributions scatter more than the errors do on
+    average, a discrepancy between measurements and packings, one per distribution, is estimated and added.
+
+    An interval is the wider of two: by the errors, and by the spread of the distributions about the best parameters
+    (Student, with the degrees of freedom that the fit leaves them). The second covers whatever stands between the
+    distributions, also where they agree by chance (G. Knapp & J. Hartung, Stat. Med. 22 (2003) 2693); a single
+    distribution leaves only the first.
 
     Parameters
     ----------
@@ -296,9 +307,9 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
     chi_square, discrepancy = _misfit(residual, chosen, freedom)
     deviance = _deviance(residual, chosen, discrepancy).reshape(shape)
     deviance -= deviance.min()
-    threshold = float(special.chdtri(1, 1.0 - CONFIDENCE))
+    scale, scale_freedom = _scale(chosen, chi_square, freedom)
     estimates = tuple(
-        _profile(parameter, axis, deviance, number, threshold)
+        _profile(parameter, axis, deviance, number, scale * likelihood_limit(scale_freedom))
         for number, (parameter, axis) in enumerate(zip(parameters, axes, strict=True))
     )
     at_best = int(np.argmin(deviance))
@@ -309,7 +320,8 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
         axes=axes,
         deviance=deviance,
         estimates=estimates,
-        threshold=threshold,
+        scale=scale,
+        scale_freedom=scale_freedom,
         chi_square=chi_square,
         degrees_of_freedom=freedom,
         discrepancy=discrepancy,
@@ -333,10 +345,14 @@ def pooled(observations: Sequence[Observation]) -> dict[str, Pool]:
 
 @dataclass(frozen=True)
 class _Groups:
-    """Variances by distribution: of the mean of its measurements (m,), and of its packings on the grid (m, n)."""
+    """Variances by distribution: of the mean of its measurements (m,), and of its packings on the grid (m, n).
+
+    ``freedom`` (m,) is that of the measurements' variances, infinite where they are known.
+    """
 
     names: tuple[str, ...]
     measured: FloatArray
+    freedom: FloatArray
     model: FloatArray
 
 
@@ -351,7 +367,8 @@ def _residuals(
     packed = [responses[name](grid) for name in measured]
     residual = np.array([own.mean - mean for own, (mean, _) in zip(measured.values(), packed, strict=True)])
     variance = np.array([own.variance for own in measured.values()])
-    return residual, _Groups(tuple(measured), variance, np.array([variance for _, variance in packed]))
+    freedom = np.array([own.freedom for own in measured.values()])
+    return residual, _Groups(tuple(measured), variance, freedom, np.array([model for _, model in packed]))
 
 
 def _squares(residual: FloatArray, groups: _Groups, discrepancy: float) -> tuple[FloatArray, FloatArray]:
@@ -370,10 +387,24 @@ def _misfit(residual: FloatArray, groups: _Groups, freedom: int) -> tuple[float,
         return float(_squares(residual, groups, discrepancy)[0].min())
 
     chi_square = least(0.0)
-    if not improbable(chi_square, freedom):
+    if freedom == 0 or chi_square <= freedom:
         return chi_square, 0.0
     widest = float(np.sqrt(np.mean(residual**2, axis=0).min() * len(groups.names) / freedom))
     return chi_square, float(scipy.optimize.brentq(lambda d: least(d) - freedom, 0.0, 1.01 * widest + 1e-9))
+
+
+def _scale(groups: _Groups, chi_square: float, freedom: int) -> tuple[float, float]:
+    """Scale of the squares and its degrees of freedom, by which the interval is the widest.
+
+    By the errors it is 1: known, or resting on the scatter of measurements that contradict each other. A distribution's
+    part in the variance of a weighted mean is its weight, the inverse of its variance: one whose measurements scatter
+    counts for little beside others that are sharp. By the distributions it is their mean square about the best
+    parameters, 1 with a discrepancy.
+    """
+    scales = [(1.0, effective_freedom(1.0 / groups.measured, groups.freedom))]
+    if freedom:
+        scales.append((min(chi_square / freedom, 1.0), float(freedom)))
+    return max(scales, key=lambda found: found[0] * likelihood_limit(found[1]))
 
 
 def _profile(parameter: Parameter, axis: FloatArray, deviance: FloatArray, number: int, threshold: float) -> Estimate:
@@ -441,7 +472,7 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
                 f"parameters: {names} trade off against each other; measure more distributions or fix one of them",
             )
         )
-    if calibration.discrepancy > 0.0:
+    if improbable(calibration.chi_square, calibration.degrees_of_freedom):
         found.append(
             Finding(
                 "misfit",
@@ -506,14 +537,19 @@ def predict(calibration: Calibration, response: Response) -> Prediction:
     """Resistance of a distribution at the calibrated parameters, with an interval.
 
     It holds the uncertainty of the parameters (their likelihood), of the packings of this distribution, and the
-    discrepancy that the calibration found.
+    discrepancy that the calibration found. Where the errors' scale was estimated, it is drawn with the parameters:
+    their distribution is Student's, and the discrepancy's too.
     """
     grid = np.stack([axis.ravel() for axis in np.meshgrid(*calibration.axes, indexing="ij")], axis=1)
-    likelihood = np.exp(-0.5 * calibration.deviance.ravel())
+    deviance, freedom = calibration.deviance.ravel() / calibration.scale, calibration.scale_freedom
+    posterior = freedom + len(calibration.parameters)
+    known = math.isinf(freedom)
+    likelihood = np.exp(-0.5 * deviance) if known else (1.0 + deviance / freedom) ** (-0.5 * posterior)
     random = np.random.default_rng(0)
     mean, variance = response(grid)
     drawn = random.choice(len(grid), size=DRAWS, p=likelihood / likelihood.sum())
-    spread = np.sqrt(variance[drawn] + calibration.discrepancy**2)
+    scale = 1.0 if known else (freedom + deviance[drawn]) / random.chisquare(posterior, DRAWS)
+    spread = np.sqrt(variance[drawn] + scale * calibration.discrepancy**2)
     values = mean[drawn] + spread * random.standard_normal(DRAWS)
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, median, high = np.exp(np.quantile(values, [tail, 0.5, 1.0 - tail]))
@@ -553,10 +589,10 @@ def _compared(taken: float, own: Calibration, friction: float, rival: Calibratio
     variance = own.measured_variance + packed + discrepancy**2
     squares = {mu: float(np.sum(fit.residual**2 / variance)) for mu, fit in ((taken, own), (friction, rival))}
     (better, least), (worse, most) = sorted(squares.items(), key=lambda item: item[1])
-    needed = float(special.chdtri(1, 1.0 - CONFIDENCE))
+    needed = likelihood_limit()
     if discrepancy > 0.0:
         freedom = own.degrees_of_freedom
-        needed = float(special.fdtri(1, freedom, CONFIDENCE)) * least / freedom
+        needed = likelihood_limit(freedom) * least / freedom
     numbers = (
         f"at equal errors chi-square {squares[friction]:.1f} with {friction:g} and {squares[taken]:.1f} with "
         f"{taken:g}; it takes a difference of {needed:.1f} to tell them apart"

@@ -13,27 +13,27 @@ from typing import Annotated, Final, Literal, NamedTuple
 import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
-from scipy import special
 
 from filtercake.calibration.pooling import chi_square, improbable, scatter
 from filtercake.errors import ConfigError, FiltrationError, Problem
+from filtercake.filtration.analysis import FiltrationAnalysis, analyse
 from filtercake.filtration.constant_pressure import (
     MINIMUM_READINGS,
+    READING_ERROR,
     BoolArray,
     CompressibilityFit,
     FiltrationFit,
     FiltrationTest,
     compressibility,
-    disagreement,
-    fit_differential,
-    fit_integral,
 )
+from filtercake.statistics import quantile
 from filtercake.study.config.values import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText
 from filtercake.study.loading import parse
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, NUMBER, FloatArray, IntArray
 from filtercake.user_files import Unusable, read_text, read_yaml
 
 TIME_UNITS: Final[dict[str, float]] = {"s": 1.0, "min": MINUTE, "h": HOUR}
+MASS_UNITS: Final[dict[str, float]] = {"kg": 1.0, "g": 1e-3, "mg": 1e-6}
 VOLUME_UNITS: Final[dict[str, float]] = {"m3": 1.0, "L": 1e-3, "mL": 1e-6, "cm3": 1e-6, "uL": 1e-9}
 
 LARGEST_FILE: Final = 10_000_000
@@ -58,8 +58,14 @@ REPEATABILITY: Final = 0.05
 SMALLEST_RELATIVE_SE: Final = 1e-6
 """Relative standard error of a resistance from data without noise."""
 
-NORMAL95: Final = float(special.ndtri(0.975))
-"""Half-width of a normal variable's 95 % interval over its standard deviation."""
+STAMPED: Final = 1.5
+"""Steps of the clock's resolution that volumes read at the same time may lie apart, at the flow around them."""
+
+LONG_RUNNING: Final = 1e6
+"""Lengths of the test in a clock's first reading that show a count from long before (1970)."""
+
+DAY: Final = 86_400.0
+"""Seconds of a day."""
 
 FIT_COLUMNS: Final = (
     "test",
@@ -87,10 +93,13 @@ COMPRESSIBILITY_COLUMNS: Final = (
     "notes",
 )
 
+Kind = Literal["time", "volume", "mass"]
+
 _SQUARE_CENTIMETRE: Final = 1e-4
 _SEPARATORS: Final = ("\t", ";", ",")
-_NAMES: Final = {
-    "time": ("t", "time", "filtration_time", "elapsed_time", "time_elapsed"),
+_NAMES: Final[dict[Kind, tuple[str, ...]]] = {
+    "time": ("t", "time", "filtration_time", "elapsed_time", "time_elapsed", "clock", "clock_time", "timestamp"),
+    "mass": ("m", "mass", "filtrate_mass", "mass_of_filtrate", "mass_filtrate", "m_filtrate", "weight", "balance"),
     "volume": ("v", "volume", "filtrate", "filtrate_volume", "volume_of_filtrate", "volume_filtrate", "v_filtrate"),
 }
 _OTHER_CASE: Final = ("T", "v")
@@ -99,20 +108,17 @@ _EXAMPLE: Final = "for example time_s,volume_mL or t [s];V [L]"
 _WANTED_HEADER: Final = f"names a column of times and one of filtrate volumes with their units, {_EXAMPLE}"
 _WITH_UNIT: Final = re.compile(r"(?P<name>[^\[(/]*?)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]|/\s*(?P<slash>\S+))")
 
-Kind = Literal["time", "volume"]
+_CLOCK_UNIT: Final = re.compile(r"h+:m+(:s+)?|m+(in)?:s+")
+"""What a header may give as the unit of clock times."""
+_CLOCK: Final = re.compile(
+    r"(?:(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{4})[T ]\s*)?"
+    r"(?P<first>[0-9]{1,3}):(?P<second>[0-5][0-9])(?::(?P<third>[0-5][0-9](?:\.[0-9]+)?))?\s*(?P<half>[AaPp][Mm])?Z?"
+)
 
 
-class ConstantPressureTest(Model):
-    """A filtration test at constant pressure, whose readings are in a CSV file."""
+class FiltrationConditions(Model):
+    """At what a filtration test was made, and how its readings are to be understood."""
 
-    name: Annotated[str, Field(min_length=1, max_length=60), TO_TEXT] | None = Field(
-        default=None, description="Name in tables and figures; the file's name without its ending if left out."
-    )
-    csd: Name = Field(description="Name of a distribution of the study.")
-    file: PathText = Field(
-        description="CSV with a column of times and one of filtrate volumes, units in the header (time_s,volume_mL); "
-        "path relative to this file."
-    )
     area_cm2: Annotated[float, Field(ge=1e-4, le=1e8, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Filter area, cm2."
     )
@@ -124,6 +130,27 @@ class ConstantPressureTest(Model):
     )
     solids_per_filtrate_kg_m3: Annotated[float, Field(ge=0.001, le=1e5, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Dry cake mass per volume of filtrate, kg/m3 (= g/L)."
+    )
+    filtrate_density_kg_m3: Annotated[float, Field(ge=300, le=20_000, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None, description="Density of the filtrate, kg/m3, where a balance gave its mass instead of its volume."
+    )
+    relative_reading_error: Annotated[float, Field(ge=1e-4, le=0.5, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=READING_ERROR,
+        description="Standard error of a time or volume over its value, for tests of two to four readings; more tell "
+        "their errors by their scatter.",
+    )
+
+
+class ConstantPressureTest(FiltrationConditions):
+    """A filtration test at constant pressure, whose readings are in a CSV file."""
+
+    name: Annotated[str, Field(min_length=1, max_length=60), TO_TEXT] | None = Field(
+        default=None, description="Name in tables and figures; the file's name without its ending if left out."
+    )
+    csd: Name = Field(description="Name of a distribution of the study.")
+    file: PathText = Field(
+        description="CSV with a column of times and one of filtrate volumes or masses, units in the header "
+        "(time_s,volume_mL); path relative to this file."
     )
 
 
@@ -175,11 +202,17 @@ class Readings(NamedTuple):
         Volumes of filtrate, m3.
     notes : tuple of str
         Every repair.
+    lines : tuple of int
+        Line of each reading in its file.
+    known_zero : bool
+        Whether time 0 is, as far as the file tells, when the filtration began.
     """
 
     time: FloatArray
     volume: FloatArray
     notes: tuple[str, ...]
+    lines: tuple[int, ...]
+    known_zero: bool
 
 
 class BothForms(NamedTuple):
@@ -229,8 +262,10 @@ class Measurements:
         The filtration tests.
     fits : tuple of BothForms
         Their fits, in the same order.
+    results : tuple of FiltrationAnalysis
+        What each of them says.
     measurements : tuple of Measurement
-        All measured resistances: the tests' (integral form), then those given directly.
+        All measured resistances: the tests', then those given directly.
     warnings : tuple of str
         Every repair, and all that is doubtful.
     files : tuple of Path
@@ -246,16 +281,17 @@ class Measurements:
     warnings: tuple[str, ...]
     files: tuple[Path, ...] = ()
     contradictions: tuple[str, ...] = ()
+    results: tuple[FiltrationAnalysis, ...] = ()
 
 
 def load_measurements(path: Path) -> Measurements:
     """Read and check a file of measurements and the tests it names, and fit the tests.
 
-    The relative error of a test's resistance is the standard error of the integral form's fit or, where integral and
-    differential form disagree by more than their intervals, the difference of their ln(alpha) if that is larger; that
-    of a value given directly is the one stated. Where other measurements, tests or values, have the same distribution
-    and pressure drop (within 1 %), the scatter of ln(alpha) between them is added, since a fit's own error says
-    nothing of what differs from run to run (see :func:`filtercake.calibration.pooling.scatter`).
+    The relative error of a test's resistance is that of its analysis, with all that its readings leave in doubt (see
+    :mod:`filtercake.filtration.analysis`); that of a value given directly is the one stated. Where other measurements,
+    tests or values, have the same distribution and pressure drop (within 1 %), the scatter of ln(alpha) between them is
+    added, since a fit's own error says nothing of what differs from run to run (see
+    :func:`filtercake.calibration.pooling.scatter`).
 
     Parameters
     ----------
@@ -270,24 +306,30 @@ def load_measurements(path: Path) -> Measurements:
     model = parse(MeasurementFile, read_yaml(path), str(path))
     problems = list(_name_problems(model, str(path)))
     tests: list[FiltrationTest] = []
-    fits: list[BothForms] = []
+    results: list[FiltrationAnalysis] = []
     for index, entry in enumerate(model.tests):
         try:
             test = _load_test(entry, path.parent)
-            fits.append(BothForms(fit_integral(test), fit_differential(test)))
+            results.append(analyse(test))
             tests.append(test)
         except FiltrationError as error:
             problems.append(Problem(str(path), f"tests[{index}].file", repr(entry.file), str(error)))
     if problems:
         raise ConfigError(problems)
     files = (path, *(path.parent / entry.file for entry in model.tests))
-    sources = [f"{entry.file} (integral form)" for entry in model.tests]
-    alone = [*_of_tests(tests, fits, sources), *_of_values(model.resistances, [test.name for test in tests])]
+    sources = [f"{entry.file} ({found.form} form)" for entry, found in zip(model.tests, results, strict=True)]
+    alone = [*_of_tests(tests, results, sources), *_of_values(model.resistances, [test.name for test in tests])]
     measured = tuple(_with_scatter(alone))
     contradictions = tuple(_contradictions(alone, [test.name for test in tests]))
-    doubts = [text for test, fit in zip(tests, fits, strict=True) for text in _doubts(test, fit)]
+    doubts = [f"{test.name}: {text}" for test, found in zip(tests, results, strict=True) for text in said(test, found)]
+    fits = tuple(BothForms(found.integral, found.differential) for found in results)
     warnings = tuple(f"{path}: {text}" for text in (*doubts, *contradictions))
-    return Measurements(model.title, tuple(tests), tuple(fits), measured, warnings, files, contradictions)
+    return Measurements(model.title, tuple(tests), fits, measured, warnings, files, contradictions, tuple(results))
+
+
+def said(test: FiltrationTest, found: FiltrationAnalysis) -> tuple[str, ...]:
+    """Return all that must be known of a test: repairs of its readings, what was left out, what is in doubt."""
+    return (*test.notes, *found.notes)
 
 
 def compressibility_by_csd(measurements: Measurements) -> dict[str, CompressibilityFit]:
@@ -336,7 +378,7 @@ def _exponent_limit(fit: CompressibilityFit, entries: Sequence[Measurement]) -> 
         return fit.exponent_ci95
     one, other = entries
     apart = abs(math.log((one.pressure_drop or math.nan) / (other.pressure_drop or math.nan)))
-    return NORMAL95 * math.hypot(one.relative_se, other.relative_se) / apart
+    return quantile() * math.hypot(one.relative_se, other.relative_se) / apart
 
 
 def with_pressure(measurements: Measurements) -> dict[str, list[Measurement]]:
@@ -349,7 +391,7 @@ def with_pressure(measurements: Measurements) -> dict[str, list[Measurement]]:
 
 
 def fits_table(measurements: Measurements) -> pd.DataFrame:
-    """Tabulate both forms' fits of every test.
+    """Tabulate both forms' fits of every test, over the readings used and from the time zero found.
 
     Returns
     -------
@@ -368,10 +410,10 @@ def fits_table(measurements: Measurements) -> pd.DataFrame:
             fit.n,
             fit.left_out,
             test.pressure_drop / KILOPASCAL,
-            "; ".join((*test.notes, *fit.notes)),
+            "; ".join(said(test, found)),
         )
-        for test, fits in zip(measurements.tests, measurements.fits, strict=True)
-        for fit in fits
+        for test, found in zip(measurements.tests, measurements.results, strict=True)
+        for fit in (found.integral, found.differential)
     ]
     return pd.DataFrame(rows, columns=list(FIT_COLUMNS))
 
@@ -402,20 +444,24 @@ def compressibility_table(measurements: Measurements) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(COMPRESSIBILITY_COLUMNS))
 
 
-def read_test(path: Path) -> Readings:
+def read_test(path: Path, filtrate_density: float | None = None) -> Readings:
     """Read times and volumes of filtrate from a CSV.
 
     Columns are separated by tabs, semicolons or commas; their names and units stand in one line (``time_s,volume_mL``,
-    ``t [s];V [L]``), other columns are ignored. Blank lines and lines that begin with # are skipped. Repairs, each with
-    a note: lines of text above the columns' names are skipped; decimal commas are read where the separator is no comma;
-    volumes read at the same time are averaged if they hardly differ (``SAME_TIME``); a volume below an earlier one is
-    left out if it falls by at most ``BALANCE_RESOLUTION`` of the largest; readings without time or volume are left out
-    (the first one silently).
+    ``t [s];V [L]``, ``time_s;mass_g``), other columns are ignored. Times may be clock times (HH:MM:SS, with or without
+    a date). Blank lines and lines that begin with # are skipped. Repairs, each with a note: lines of text above the
+    columns' names are skipped; decimal commas are read where the separator is no comma; clock times go on over
+    midnight; a volume at time zero was there before, and is taken off all; volumes read at the same time are averaged
+    if they hardly differ (``SAME_TIME``) or the clock's resolution explains it (``STAMPED``); a volume below an earlier
+    one is left out if it falls by at most ``BALANCE_RESOLUTION`` of the largest; readings without time or volume are
+    left out (the first one silently).
 
     Parameters
     ----------
     path : Path
         UTF-8 text, at most ``LARGEST_FILE`` bytes.
+    filtrate_density : float, optional
+        Density of the filtrate, kg/m3, which makes volumes of masses.
 
     Raises
     ------
@@ -429,21 +475,23 @@ def read_test(path: Path) -> Readings:
         notes.append(f"{_lines_text([n for n, _ in lines[: header.position]])} above the column header skipped")
     cells = _cells(path, header, lines[header.position + 1 :])
     if _has_decimal_commas(path, header, cells):
-        cells = [(line, time.replace(",", "."), volume.replace(",", ".")) for line, time, volume in cells]
+        cells = [(line, time.replace(",", "."), amount.replace(",", ".")) for line, time, amount in cells]
         notes.append("decimal commas read as decimal points")
     line = np.array([n for n, _, _ in cells], dtype=np.int64)
-    time = np.array([_number(path, n, "time", text) for n, text, _ in cells])
-    volume = np.array([_number(path, n, "volume", text) for n, _, text in cells])
-    readings = _Rows(line, time * header.time_factor, volume * header.volume_factor)
-    for repair in (_merged, _rising, _started):
-        readings, found = repair(path, readings)
+    clock = _times(path, header, cells)
+    amount = np.array([_number(path, n, header.kind, text) for n, _, text in cells])
+    readings = _Rows(line, clock.time, amount * _volume_factor(path, header, filtrate_density))
+    notes += clock.notes
+    known_zero = clock.known_zero(readings.volume)
+    for repair in (_ascending, _begun, _merged, _rising, _started):
+        readings, found = repair(path, readings, clock)
         notes += found
     if readings.time.size < MINIMUM_READINGS:
         raise FiltrationError(
             f"{path}: {readings.time.size} usable readings: must be at least {MINIMUM_READINGS} with time and volume "
             "above zero"
         )
-    return Readings(readings.time, readings.volume, tuple(notes))
+    return Readings(readings.time, readings.volume, tuple(notes), tuple(readings.line.tolist()), known_zero)
 
 
 class _Rows(NamedTuple):
@@ -455,15 +503,30 @@ class _Rows(NamedTuple):
 
 
 class _Header(NamedTuple):
-    """Where and what the column header is."""
+    """Where and what the column header is: line, columns, the columns of time and filtrate, and their units."""
 
     position: int
+    line: int
     separator: str
     columns: int
     time: int
-    volume: int
-    time_factor: float
-    volume_factor: float
+    time_unit: str | None
+    kind: Kind
+    amount: int
+    amount_unit: str | None
+
+
+class _Clock(NamedTuple):
+    """Times of the readings, shape (n,), and how they were given."""
+
+    time: FloatArray
+    resolution: float
+    of_day: bool
+    notes: tuple[str, ...]
+
+    def known_zero(self, volume: FloatArray) -> bool:
+        """Whether time zero is when the filtration began: by a stopwatch, or a first reading without filtrate."""
+        return not self.of_day or (volume.size > 0 and volume[0] == 0.0)
 
 
 def _lines(path: Path) -> list[tuple[int, str]]:
@@ -488,15 +551,16 @@ def _split(path: Path, line: int, text: str, separator: str) -> list[str]:
 
 
 def _header(path: Path, lines: Sequence[tuple[int, str]]) -> _Header:
-    """Find the first line that names a column of times and one of volumes."""
+    """Find the first line that names a column of times and one of volumes, or of masses."""
     for position, (line, text) in enumerate(lines):
         for separator in _SEPARATORS:
             cells = _split(path, line, text, separator)
             columns = [_column(cell) for cell in cells]
-            if {"time", "volume"} <= {kind for kind, _ in columns}:
-                time, time_factor = _the_column(path, line, columns, "time")
-                volume, volume_factor = _the_column(path, line, columns, "volume")
-                return _Header(position, separator, len(cells), time, volume, time_factor, volume_factor)
+            kinds = {kind for kind, _ in columns}
+            amount: Kind = "volume" if "volume" in kinds else "mass"
+            if {"time", amount} <= kinds:
+                at, of = (_the_column(path, line, columns, wanted) for wanted in ("time", amount))
+                return _Header(position, line, separator, len(cells), *at, amount, *of)
             if len(cells) > 1 and all(NUMBER.fullmatch(cell.replace(",", ".")) for cell in cells):
                 raise FiltrationError(
                     f"{path}: line {line}: {_shown(text)}: numbers, but no line above {_WANTED_HEADER}"
@@ -505,7 +569,7 @@ def _header(path: Path, lines: Sequence[tuple[int, str]]) -> _Header:
 
 
 def _column(cell: str) -> tuple[Kind | None, str | None]:
-    """Tell whether a column holds times or volumes, and the unit its header states."""
+    """Tell whether a column holds times, volumes or masses, and the unit its header states."""
     match = _WITH_UNIT.fullmatch(cell)
     name, unit = (match["name"], match["unit"] or match["slash"]) if match else (cell, None)
     kind = _kind(name)
@@ -520,11 +584,11 @@ def _column(cell: str) -> tuple[Kind | None, str | None]:
 
 def _kind(name: str) -> Kind | None:
     plain = re.sub(r"[\s_-]+", "_", name.strip().lower())
-    return "time" if plain in _NAMES["time"] else "volume" if plain in _NAMES["volume"] else None
+    return next((kind for kind, names in _NAMES.items() if plain in names), None)
 
 
 def _units(kind: Kind) -> dict[str, float]:
-    return TIME_UNITS if kind == "time" else VOLUME_UNITS
+    return {"time": TIME_UNITS, "volume": VOLUME_UNITS, "mass": MASS_UNITS}[kind]
 
 
 def _factor(unit: str | None, units: dict[str, float]) -> float | None:
@@ -537,20 +601,111 @@ def _factor(unit: str | None, units: dict[str, float]) -> float | None:
 
 def _the_column(
     path: Path, line: int, columns: Sequence[tuple[Kind | None, str | None]], wanted: Kind
-) -> tuple[int, float]:
-    """Index of the one column of a kind and the factor of its unit."""
+) -> tuple[int, str | None]:
+    """Index of the one column of a kind, and its unit."""
     found = [(index, unit) for index, (kind, unit) in enumerate(columns) if kind == wanted]
     if len(found) > 1:
         raise FiltrationError(f"{path}: line {line}: {len(found)} columns of {wanted}: must be exactly one")
-    index, unit = found[0]
-    units = _units(wanted)
+    return found[0]
+
+
+def _known_factor(path: Path, line: int, kind: Kind, unit: str | None) -> float:
+    """SI factor of the unit of a column."""
+    units = _units(kind)
     factor = _factor(unit, units)
     if factor is None:
         says = f"has the unit {unit!r}" if unit else "has no unit"
         raise FiltrationError(
-            f"{path}: line {line}: the column of {wanted} {says}: must be one of {', '.join(units)}, {_EXAMPLE}"
+            f"{path}: line {line}: the column of {kind} {says}: must be one of {', '.join(units)}, {_EXAMPLE}"
         )
-    return index, factor
+    return factor
+
+
+def _volume_factor(path: Path, header: _Header, density: float | None) -> float:
+    """Return what makes m3 of the column of filtrate."""
+    factor = _known_factor(path, header.line, header.kind, header.amount_unit)
+    if header.kind == "volume":
+        return factor
+    if density is None:
+        raise FiltrationError(
+            f"{path}: line {header.line}: holds masses of filtrate: give filtrate_density_kg_m3, the filtrate's "
+            "density (water 998, ethanol 789 at 20 C), or a column of volumes"
+        )
+    return factor / density
+
+
+def _times(path: Path, header: _Header, cells: Sequence[tuple[int, str, str]]) -> _Clock:
+    """Read times in s: numbers with the header's unit, or clock times; those of the day from the first reading on."""
+    as_clock = any(":" in text for _, text, _ in cells)
+    if as_clock:
+        time, of_day, notes = _clock_times(path, header, cells)
+        resolution = _resolution(text.partition(".")[2].rstrip("AaPpMmZ ") for _, text, _ in cells)
+    else:
+        factor = _known_factor(path, header.line, "time", header.time_unit)
+        given = np.array([_number(path, n, "time", text) for n, text, _ in cells])
+        decimals = ("9" * 9 if set(text) & set("eE") else text.partition(".")[2] for _, text, _ in cells)
+        time, of_day, notes = given * factor, False, []
+        resolution = factor * _resolution(decimals)
+    if not of_day and time.size > 1 and time[0] > LONG_RUNNING * (time[-1] - time[0]):
+        of_day = True  # a clock that was not started for the test
+    if of_day and time.size:
+        time = time - time[0]
+        notes.append(f"times are counted from line {cells[0][0]}")
+    return _Clock(time, resolution, of_day, tuple(notes))
+
+
+def _resolution(decimals: Iterable[str]) -> float:
+    """Step of numbers with these decimals, in their unit."""
+    return float(10.0 ** -max((len(text) for text in decimals), default=0))
+
+
+def _clock_times(
+    path: Path, header: _Header, cells: Sequence[tuple[int, str, str]]
+) -> tuple[FloatArray, bool, list[str]]:
+    """Seconds of clock times, whether they are of the day, and notes."""
+    matches = [_CLOCK.fullmatch(text) for _, text, _ in cells]
+    for match, (line, text, _) in zip(matches, cells, strict=True):
+        if match is None:
+            raise FiltrationError(f"{path}: line {line}: time = {_shown(text)}: must be a clock time, HH:MM:SS")
+    found = [match for match in matches if match is not None]
+    unit = (header.time_unit or "").lower().replace(" ", "")
+    short = [cell for match, cell in zip(found, cells, strict=True) if match["third"] is None]
+    if short and not _CLOCK_UNIT.fullmatch(unit):
+        line, text, _ = short[0]
+        raise FiltrationError(
+            f"{path}: line {line}: time = {_shown(text)}: hours and minutes, or minutes and seconds? The header must "
+            "say it: time [hh:mm] or time [mm:ss]"
+        )
+    time = np.array([_seconds(match, in_minutes=unit.startswith("m")) for match in found])
+    dated = all(match["date"] for match in found)
+    of_day = any(match["date"] or match["half"] for match in found) or (time.size > 0 and time[0] >= HOUR)
+    if not of_day or dated:
+        return time, of_day, []
+    day = DAY if any(match["half"] or int(match["first"]) > 12 for match in found) else 0.5 * DAY
+    falls = np.diff(time, prepend=time[0]) < -0.5 * day
+    over = "midnight" if day == DAY else "12"
+    notes = [
+        f"line {line}: the clock went over {over}" for (line, _, _), fell in zip(cells, falls, strict=True) if fell
+    ]
+    return time + day * np.cumsum(falls), of_day, notes
+
+
+def _seconds(match: re.Match[str], *, in_minutes: bool) -> float:
+    """Seconds of one clock time; from 1970 with a date."""
+    first, second, third = float(match["first"]), float(match["second"]), float(match["third"] or 0.0)
+    if match["third"] is None and in_minutes:
+        return MINUTE * first + second
+    if match["half"]:
+        first = first % 12.0 + (12.0 if match["half"].lower() == "pm" else 0.0)
+    seconds = HOUR * first + MINUTE * second + third
+    if match["date"] is None:
+        return seconds
+    day = (
+        match["date"]
+        if "-" in match["date"]
+        else "-".join(part.zfill(2) for part in reversed(match["date"].split(".")))
+    )
+    return seconds + DAY * float(np.datetime64(day, "D").astype(np.int64))
 
 
 def _cells(path: Path, header: _Header, lines: Iterable[tuple[int, str]]) -> list[tuple[int, str, str]]:
@@ -566,7 +721,7 @@ def _cells(path: Path, header: _Header, lines: Iterable[tuple[int, str]]) -> lis
                 + (" (decimal commas? separate the columns by semicolons)" if header.separator == "," else "")
             )
         cells += [""] * (header.columns - len(cells))
-        rows.append((line, cells[header.time], cells[header.volume]))
+        rows.append((line, cells[header.time], cells[header.amount]))
     return rows
 
 
@@ -589,8 +744,8 @@ def _number(path: Path, line: int, name: str, text: str) -> float:
     raise FiltrationError(f"{path}: line {line}: {name} = {_shown(text)}: {allowed}")
 
 
-def _merged(path: Path, rows: _Rows) -> tuple[_Rows, list[str]]:
-    """Average what was read at the same time; times that go back are an error."""
+def _ascending(path: Path, rows: _Rows, _clock: _Clock) -> tuple[_Rows, list[str]]:
+    """Refuse times that go back."""
     back = np.flatnonzero(np.diff(rows.time) < 0.0)
     if back.size:
         k = back[0]
@@ -598,20 +753,56 @@ def _merged(path: Path, rows: _Rows) -> tuple[_Rows, list[str]]:
             f"{path}: line {rows.line[k + 1]}: time = {rows.time[k + 1]:g} s, after {rows.time[k]:g} s in line "
             f"{rows.line[k]}: times must ascend"
         )
+    return rows, []
+
+
+def _begun(_path: Path, rows: _Rows, clock: _Clock) -> tuple[_Rows, list[str]]:
+    """Begin with the one reading at time zero, and take the filtrate that was there off all volumes.
+
+    Of a clock that was not started with the test, time zero is the last reading without filtrate, or not known.
+    """
+    if not (rows.time.size and rows.time[0] == 0.0):
+        return rows, []
+    if clock.of_day:
+        last = int(np.argmax(rows.volume > 0.0)) - 1 if rows.volume[0] == 0.0 and rows.volume.any() else 0
+        return _Rows(rows.line[last:], rows.time[last:] - rows.time[last], rows.volume[last:]), []
+    there, at_zero = float(rows.volume[0]), rows.time == 0.0
+    keep, notes = ~at_zero, []
+    keep[0] = True
+    if at_zero.sum() > 1:
+        notes.append(f"{_lines_text(rows.line[at_zero][1:])}: at time zero as the line before, left out")
+    if there > 0.0:
+        notes.append(
+            f"line {rows.line[0]}: {there / VOLUME_UNITS['mL']:.4g} mL at time zero, taken off all volumes (if the "
+            "clock was started late instead, the cake's resistance is the same, the medium's is not)"
+        )
+    chosen = _chosen(rows, keep)
+    return chosen._replace(volume=np.maximum(chosen.volume - there, 0.0)), notes
+
+
+def _merged(path: Path, rows: _Rows, clock: _Clock) -> tuple[_Rows, list[str]]:
+    """Average what was read at the same time."""
     time, first, where, count = np.unique(rows.time, return_index=True, return_inverse=True, return_counts=True)
     if time.size == rows.time.size:
         return rows, []
-    _require_alike(path, rows)
     volume = np.bincount(where, weights=rows.volume) / count
+    _require_alike(path, rows, clock.resolution * _flow(time, volume)[where])
     again = rows.line[np.concatenate([[False], np.diff(rows.time) == 0.0])]
     note = f"{_lines_text(again)}: read at the same time as the line before, volumes averaged"
     return _Rows(rows.line[first], time, volume), [note]
 
 
-def _require_alike(path: Path, rows: _Rows) -> None:
-    """Refuse volumes of one time that differ too much; of time zero all are left out later on."""
+def _flow(time: FloatArray, volume: FloatArray) -> FloatArray:
+    """Flow about each time from its neighbours, m3/s; 0 where there are none."""
+    if time.size < 2:
+        return np.zeros_like(time)
+    return np.abs(np.gradient(volume, time))
+
+
+def _require_alike(path: Path, rows: _Rows, step: FloatArray) -> None:
+    """Refuse volumes of one time that differ too much; ``step`` is what flows while the clock shows the same."""
     largest = pd.Series(rows.volume).groupby(rows.time).transform("max").to_numpy(np.float64)
-    allowed = np.maximum(SAME_TIME * largest, BALANCE_RESOLUTION * rows.volume.max())
+    allowed = np.maximum(np.maximum(SAME_TIME * largest, BALANCE_RESOLUTION * rows.volume.max()), STAMPED * step)
     apart = (rows.time > 0.0) & (largest - rows.volume > allowed)
     if apart.any():
         k = int(np.argmax(apart))
@@ -625,7 +816,7 @@ def _require_alike(path: Path, rows: _Rows) -> None:
         )
 
 
-def _rising(path: Path, rows: _Rows) -> tuple[_Rows, list[str]]:
+def _rising(path: Path, rows: _Rows, _clock: _Clock) -> tuple[_Rows, list[str]]:
     """Leave out volumes a little below an earlier one; a real fall is an error."""
     if not rows.volume.size:
         return rows, []
@@ -645,14 +836,12 @@ def _rising(path: Path, rows: _Rows) -> tuple[_Rows, list[str]]:
     return _chosen(rows, ~falls), [note]
 
 
-def _started(_path: Path, rows: _Rows) -> tuple[_Rows, list[str]]:
-    """Leave out readings without time or volume; a volume at time zero is worth a note even in the first."""
-    empty = (rows.time == 0.0) | (rows.volume == 0.0)
-    notes = []
-    if rows.time.size and rows.time[0] == 0.0 and rows.volume[0] > 0.0:
-        notes.append(f"line {rows.line[0]}: filtrate at time zero; left out, the other volumes are taken as they are")
-    if empty[1:].any():
-        notes.append(f"{_lines_text(rows.line[1:][empty[1:]])}: without time or volume, left out")
+def _started(_path: Path, rows: _Rows, clock: _Clock) -> tuple[_Rows, list[str]]:
+    """Leave out readings without time or volume, the first one silently."""
+    empty = rows.volume == 0.0
+    if not clock.of_day or empty[:1].any():
+        empty |= rows.time == 0.0
+    notes = [f"{_lines_text(rows.line[1:][empty[1:]])}: without time or volume, left out"] if empty[1:].any() else []
     return _chosen(rows, ~empty), notes
 
 
@@ -684,10 +873,21 @@ def _name_problems(model: MeasurementFile, file: str) -> Iterator[Problem]:
 
 
 def _load_test(entry: ConstantPressureTest, folder: Path) -> FiltrationTest:
-    readings = read_test(folder / entry.file)
+    return filtration_test_of(entry, entry.name or Path(entry.file).stem, entry.csd, folder / entry.file)
+
+
+def filtration_test_of(entry: FiltrationConditions, name: str, csd: str, file: Path) -> FiltrationTest:
+    """Read a test's file and join it with the conditions.
+
+    Raises
+    ------
+    FiltrationError
+        As :func:`read_test`.
+    """
+    readings = read_test(file, entry.filtrate_density_kg_m3)
     return FiltrationTest(
-        name=entry.name or Path(entry.file).stem,
-        csd=entry.csd,
+        name=name,
+        csd=csd,
         time=readings.time,
         volume=readings.volume,
         area=entry.area_cm2 * _SQUARE_CENTIMETRE,
@@ -695,16 +895,18 @@ def _load_test(entry: ConstantPressureTest, folder: Path) -> FiltrationTest:
         viscosity=entry.viscosity_mPa_s * MILLIPASCAL_SECOND,
         solids_per_filtrate=entry.solids_per_filtrate_kg_m3,
         notes=readings.notes,
+        lines=readings.lines,
+        known_zero=readings.known_zero,
+        reading_error=entry.relative_reading_error,
     )
 
 
 def _of_tests(
-    tests: Sequence[FiltrationTest], fits: Sequence[BothForms], sources: Sequence[str]
+    tests: Sequence[FiltrationTest], results: Sequence[FiltrationAnalysis], sources: Sequence[str]
 ) -> Iterator[Measurement]:
-    for test, fit, source in zip(tests, fits, sources, strict=True):
-        apart = abs(math.log(fit.differential.resistance / fit.integral.resistance)) if disagreement(*fit) else 0.0
-        error = max(fit.integral.resistance_se / fit.integral.resistance, apart, SMALLEST_RELATIVE_SE)
-        yield Measurement(test.name, test.csd, fit.integral.resistance, error, test.pressure_drop, source)
+    for test, found, source in zip(tests, results, sources, strict=True):
+        error = max(found.resistance_se / found.resistance, SMALLEST_RELATIVE_SE)
+        yield Measurement(test.name, test.csd, found.resistance, error, test.pressure_drop, source)
 
 
 def _with_scatter(measured: Sequence[Measurement]) -> Iterator[Measurement]:
@@ -772,15 +974,3 @@ def _numbered(stem: str) -> Iterator[str]:
     while True:
         yield f"{stem} ({number})"
         number += 1
-
-
-def _doubts(test: FiltrationTest, fits: BothForms) -> Iterator[str]:
-    """Repairs, notes and disagreement of one test, each said once."""
-    yield from (f"{test.name}: {note}" for note in test.notes)
-    common = [note for note in fits.integral.notes if note in fits.differential.notes]
-    yield from (f"{test.name}: {note}" for note in common)
-    for fit in fits:
-        yield from (f"{test.name}, {fit.form} form: {note}" for note in fit.notes if note not in common)
-    apart = disagreement(*fits)
-    if apart is not None:
-        yield f"{test.name}: {apart}"

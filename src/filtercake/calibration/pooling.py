@@ -6,6 +6,7 @@ that, added to every measurement's error, makes the weighted sum of squares what
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -41,6 +42,11 @@ class Pool:
     chi_square: float
     degrees_of_freedom: int
     scatter: float
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the variance: infinite unless a scatter was estimated for it."""
+        return float(self.degrees_of_freedom) if self.scatter > 0.0 else math.inf
 
 
 def pool(values: ArrayLike, errors: ArrayLike) -> Pool:

@@ -387,9 +387,51 @@ def conclude(settings: Settings, observations: Sequence[Observation], simulated:
         fit=fit,
         rivals=rivals,
         left_out=leave_one_out(observations, main),
-        findings=(*settings.doubts, *fit.findings, *friction, *_soft(settings, fit)),
+        findings=(*settings.doubts, *_explained(settings, fit, simulated), *friction, *_soft(settings, fit)),
         responses={(name, mu): r for mu, responses in by_friction.items() for name, r in responses.items()},
     )
+
+
+def _explained(settings: Settings, fit: Calibration, simulated: pd.DataFrame) -> tuple[Finding, ...]:
+    """Return the findings of the fit, but for what points without accepted packings explain; those are named instead.
+
+    Outside the cohesions that were packed, only the smooth model's guess keeps a cohesion in or out of the interval:
+    what is not known there is no fault of the measurements.
+    """
+    rows = simulated[simulated["csd"].isin(settings.measured)]
+    if not settings.fits_friction:
+        rows = rows[np.isclose(rows["friction"], settings.frictions[0])]
+    good = rows[rows["status"] == "ok"]
+    points = ["csd", "cohesion_kJ_m3"]
+    failed = sorted(
+        set(rows[points].itertuples(index=False, name=None)) - set(good[points].itertuples(index=False, name=None))
+    )
+    if not failed:
+        return fit.findings
+    packed = good.groupby("csd")["cohesion_kJ_m3"]
+    lowest, highest = float(packed.min().max()), float(packed.max().min())
+    below = any(value < lowest for _, value in failed) and fit.estimates[0].low < lowest
+    above = any(value > highest for _, value in failed) and fit.estimates[0].high > highest
+    names = ", ".join(
+        f"{csd} at {', '.join(f'{value:g}' for name, value in failed if name == csd)} kJ/m3"
+        for csd in dict.fromkeys(name for name, _ in failed)
+    )
+    text = f"no packing was accepted of {names} (column reason of replicates.csv)"
+    if below or above:
+        where = " and ".join([f"below {lowest:g}"] * below + [f"above {highest:g}"] * above)
+        text += (
+            f": {where} kJ/m3 the interval is the smooth model's guess, not what the measurements say; make these "
+            "packings possible (make retry, or the study's packing settings)"
+        )
+    explained = {"several", "flat"} if below or above else set()
+    kept = [
+        finding
+        for finding in fit.findings
+        if finding.kind not in explained
+        and not (below and (finding.kind == "zero" or "lower end" in finding.text))
+        and not (above and "upper end" in finding.text)
+    ]
+    return (Finding("failed", text), *kept)
 
 
 def _untested(settings: Settings) -> tuple[Finding, ...]:
@@ -433,6 +475,8 @@ def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
             for e in fit.estimates
         },
         "friction": settings.fixed_friction,
+        "threshold": fit.threshold,
+        "scale_freedom": fit.scale_freedom if math.isfinite(fit.scale_freedom) else None,
         "chi_square": fit.chi_square,
         "degrees_of_freedom": fit.degrees_of_freedom,
         "discrepancy": fit.discrepancy,
@@ -458,7 +502,8 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
 
     ``relative_uncertainty`` is as the fit takes it: with the scatter of measurements that contradict each other.
     ``left_out_m_kg`` is the resistance that the other distributions predict for this one; ``left_out_ln_error`` its
-    error, in ln(alpha), against the weighted mean of the distribution's measurements.
+    error, in ln(alpha), against the weighted mean of the distribution's measurements. ``scatter_freedom`` are the
+    degrees of freedom of that scatter; blank where the errors are known.
     """
     friction = settings.fixed_friction
     means = pooled(observations)
@@ -473,6 +518,7 @@ def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Ob
                 "csd": item.csd,
                 "measured_m_kg": math.exp(item.ln_resistance),
                 "relative_uncertainty": math.hypot(item.standard_error, means[item.csd].scatter),
+                "scatter_freedom": freedom if math.isfinite(freedom := means[item.csd].freedom) else math.nan,
                 "modelled_m_kg": math.exp(float(mean[0])),
                 "modelled_low_m_kg": whole.low,
                 "modelled_high_m_kg": whole.high,

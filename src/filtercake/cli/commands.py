@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from filtercake import __version__, api
+from filtercake.calibration.measurements import FiltrationConditions
 from filtercake.cli import options as words
 from filtercake.cli.schema import study_template
 from filtercake.crystals.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import publish
+from filtercake.statistics import half_width
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
@@ -48,6 +49,7 @@ EXAMPLES = {
     "rerun": "filtercake rerun report",
     "estimate": "filtercake estimate config/studies/pmma.yaml --cores 100",
     "porosity": "filtercake porosity packing/r0.npz --profile",
+    "test": "filtercake test config/measurements/synthetic_tests.yaml",
     "filter-area": (
         "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 "
         "--pressure-drop-kPa 53.3 --submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9"
@@ -105,6 +107,7 @@ def build_parser() -> words.Parser:
     _add_porosity(commands)
     _add_resistance(commands)
     _add_filter_area(commands)
+    _add_test(commands)
     _add_export(commands)
     _add_rerun(commands)
     _add_estimate(commands)
@@ -177,6 +180,21 @@ def _add_filter_area(commands: Any) -> None:
     words.add_model(parser.add_argument_group("filter and slurry"), api.FilterOptions)
 
 
+def _add_test(commands: Any) -> None:
+    text = (
+        "Specific cake resistance (m/kg) and medium resistance (1/m) of a filtration test at constant pressure, with "
+        "95 % intervals; which readings were left out, and why."
+    )
+    parser = _command(commands, "test", _run_test, text)
+    parser.add_argument(
+        "file",
+        metavar="FILE",
+        help="CSV of times and filtrate volumes or masses (time_s,volume_mL), with the options below; or a YAML file "
+        "of measurements, without them",
+    )
+    words.add_model(parser.add_argument_group("test, for a CSV"), FiltrationConditions)
+
+
 def _add_export(commands: Any) -> None:
     text = "Write one packing of a study to a folder that stands alone: deck, cloud, seeds, versions, log, a README."
     parser = _command(commands, "export", _run_export, text)
@@ -230,7 +248,9 @@ def _run_csd(options: argparse.Namespace) -> int:
         "kept_volume_fraction": found.kept_volume_fraction,
     }
     if options.json:
-        return _print_json({"classes": table.to_dict("records"), **values})
+        return _print_json({"understood": full.understood, "classes": table.to_dict("records"), **values})
+    if full.understood:
+        print(f"{options.file or 'distribution'}: {full.understood}\n")
     _print_table(
         ["size, um", "volume fraction", "number fraction", "packed volume fraction"], table.iloc[:, [0, 1, 2, 5]]
     )
@@ -248,10 +268,17 @@ def _run_csd(options: argparse.Namespace) -> int:
     )
 
 
+def _say_understood(options: argparse.Namespace, source: api.Distribution) -> None:
+    """Say how a distribution was read, once nothing else is wrong."""
+    if source.full.understood:
+        _say(f"{options.file or 'distribution'}: {source.full.understood}")
+
+
 def _run_pack(options: argparse.Namespace) -> int:
     source = api.distribution(**words.source(options))
     asked = words.given(options, (*Material.model_fields, *Packing.model_fields))
     found = api.pack(source, options.output, say=_say, replace=options.replace, **asked)
+    _say_understood(options, source)
     for warning in found.warnings:
         _say(f"warning: {words.with_flags(warning, vars(options))}")
     summary, status = found.summary, 0 if found.files else FAILED
@@ -274,7 +301,7 @@ def _run_pack(options: argparse.Namespace) -> int:
 
 
 def _interval(half: float | None, unit: str) -> str:
-    return unit if half is None else f"+- {_number(half)} {unit} (95 %)".replace("  ", " ")
+    return f"+- {'-' if half is None else _number(half)} {unit} (95 %)".replace("  ", " ")
 
 
 def _say(line: str) -> None:
@@ -313,6 +340,7 @@ def _run_porosity(options: argparse.Namespace) -> int:
 def _run_resistance(options: argparse.Namespace) -> int:
     source = api.distribution(**words.source(options))
     found = api.resistance(source, **words.given(options, api.ResistanceOptions.model_fields))
+    _say_understood(options, source)
     if options.json:
         return _print_json(asdict(found))
     return _print_lines(
@@ -337,6 +365,30 @@ def _run_filter_area(options: argparse.Namespace) -> int:
     if found.cake_thickness_mm is not None:
         lines.append(("cake thickness", found.cake_thickness_mm, "mm"))
     return _print_lines(lines)
+
+
+def _run_test(options: argparse.Namespace) -> int:
+    conditions = words.given(options, FiltrationConditions.model_fields)
+    if not options.file.endswith((".yaml", ".yml")):
+        found = [api.filtration_test(options.file, **conditions)]
+    elif conditions:
+        raise words.UsageError(f"{words.flag(next(iter(conditions)))}: goes with a CSV; {options.file} says it itself")
+    else:
+        found = api.filtration_tests(options.file)
+    if options.json:
+        return _print_json({"tests": [asdict(item) for item in found]})
+    for item in found:
+        print(f"{item.name} ({item.readings - item.readings_left_out} of {item.readings} readings, {item.form} form)")
+        _print_lines(
+            [
+                ("cake resistance", item.resistance_m_kg, _interval(item.resistance_ci95_m_kg, "m/kg")),
+                ("medium resistance", item.medium_resistance_1_m, _interval(item.medium_resistance_ci95_1_m, "1/m")),
+                ("filtration began at", item.time_zero_s, "s of the clock"),
+            ]
+        )
+        for note in item.notes:
+            print(f"- {words.with_flags(note, vars(options))}")
+    return 0
 
 
 def _run_export(options: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from filtercake.api.steps import ORIGIN
+from filtercake.api.steps import ORIGIN, SOURCES
 from filtercake.cli.schema import allowed, meaning
 from filtercake.errors import ConfigError, FiltercakeError, Problem, did_you_mean
 from filtercake.study.config.crystals import Crystallizer, Csd
@@ -21,7 +21,13 @@ SOURCE_FIELDS: tuple[tuple[type[BaseModel], tuple[str, ...]], ...] = (
     (Crystallizer, ("bin_width_um",)),
     (Csd, ("truncate_below_volume_fraction", "truncate_below_um", "truncate_above_um")),
 )
-SOURCE_OPTIONS = ("file", "mixture", *(name for _, names in SOURCE_FIELDS for name in names))
+SOURCE_OPTIONS = (
+    "file",
+    "mixture",
+    "lognormal",
+    "rosin_rammler",
+    *(name for _, names in SOURCE_FIELDS for name in names),
+)
 SAID_OTHERWISE = {
     "residence_time_min": "Residence time of the crystallizer, min; goes with --kinetics.",
     "kinetics": "Crystallizer's product: a preset (ammonium_alum, potassium_nitrate), or a name in --kinetics-file.",
@@ -29,7 +35,8 @@ SAID_OTHERWISE = {
     "kinetics_file": "YAML with kinetics of your own.",
 }
 """Help where the model speaks of a study file."""
-DEFAULT_OTHERWISE = {"truncate_below_volume_fraction": "0, or 0.001 with --kinetics"}
+DEFAULT_OTHERWISE = {"truncate_below_volume_fraction": "0; 0.001 with --kinetics, --lognormal and --rosin-rammler"}
+SOURCES_SHOWN = "FILE, --mixture, --lognormal, --rosin-rammler and --kinetics"
 NOT_GIVEN = "(missing)"
 
 
@@ -72,10 +79,23 @@ def add_model(group: argparse._ArgumentGroup, model: type[BaseModel]) -> None:
 
 def add_source(parser: argparse.ArgumentParser) -> None:
     """Add the options that give a size distribution."""
-    group = parser.add_argument_group("size distribution (one of FILE, --mixture and --kinetics)")
-    group.add_argument("file", nargs="?", metavar="FILE", help="CSV with the columns size_um,volume_fraction")
+    group = parser.add_argument_group(f"size distribution (one of {SOURCES_SHOWN})")
+    group.add_argument(
+        "file",
+        nargs="?",
+        metavar="FILE",
+        help="CSV with the columns size_um,volume_fraction, or as a spreadsheet or an instrument writes it",
+    )
     group.add_argument(
         "--mixture", metavar="UM:FRACTION,...", help="sizes in um with their volume fractions: 20:0.5,50:0.5"
+    )
+    group.add_argument(
+        "--lognormal", metavar="D10,D50,D90", help="lognormal by volume: sizes in um that 10, 50 and 90 %% are below"
+    )
+    group.add_argument(
+        "--rosin-rammler",
+        metavar="UM,EXPONENT",
+        help="Rosin-Rammler by volume: size in um that 36.8 %% is above, exponent",
     )
     for model, names in SOURCE_FIELDS:
         for name in names:
@@ -93,6 +113,9 @@ def source(options: argparse.Namespace) -> dict[str, Any]:
     found = given(options, SOURCE_OPTIONS)
     if "mixture" in found:
         found["mixture"] = _pairs(found["mixture"])
+    for law in ("lognormal", "rosin_rammler"):
+        if law in found:
+            found[law] = [number.strip() for number in found[law].split(",")]
     return found
 
 
@@ -123,9 +146,10 @@ def _problem_in_words(problem: Problem, known: set[str]) -> str:
     if problem.file != str(ORIGIN):  # in a file, whose keys are no options
         return str(problem)
     name = _option_of(problem.key, known)
-    text = with_flags(problem.allowed, known)
+    allowed_ = problem.allowed
     if problem.key == "distribution":
-        text = text.replace("mixture, file and kinetics", "FILE, --mixture and --kinetics")
+        allowed_ = allowed_.replace(f"{', '.join(SOURCES[:-1])} and {SOURCES[-1]}", SOURCES_SHOWN)
+    text = with_flags(allowed_, known)
     value = problem.value.strip("'")
     if name == "file" and value and text.startswith(value):
         return text
@@ -140,8 +164,9 @@ def _problem_in_words(problem: Problem, known: set[str]) -> str:
 def _option_of(key: str, known: set[str]) -> str | None:
     """Option that a key of the checked study stands for."""
     parts = re.sub(r"\[\d+\]", "", key).split(".")
-    if "mixture" in parts:
-        return "mixture"
+    for source_ in ("mixture", "lognormal", "rosin_rammler"):
+        if source_ in parts:
+            return source_
     return next((part for part in reversed(parts) if part in known), None)
 
 

@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 
 from filtercake.calibration.config import Calibration, CohesionRange
 from filtercake.calibration.measurements import ConstantPressureTest, KnownResistance, MeasurementFile
-from filtercake.study.config.crystals import Crystallizer, Csd, SizeClass
+from filtercake.study.config.crystals import Crystallizer, Csd, Lognormal, RosinRammler, SizeClass
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
@@ -72,6 +72,10 @@ def study_template() -> str:
         "      - {size_um: 50, volume_fraction: 0.5}",
         f"    # or: {meaning(Csd.model_fields['file'])}",
         "    # file: ../csd/example.csv",
+        f"    # or: {meaning(Csd.model_fields['lognormal'])}",
+        "    # lognormal: {d10_um: 20, d50_um: 40, d90_um: 80}",
+        f"    # or: {meaning(Csd.model_fields['rosin_rammler'])}",
+        "    # rosin_rammler: {size_um: 60, exponent: 3}",
         f"    # {meaning(Csd.model_fields['truncate_below_volume_fraction'])}",
         "    # truncate_below_volume_fraction: 0.001",
         f"    # {meaning(Csd.model_fields['truncate_below_um'])}",
@@ -116,6 +120,8 @@ def reference() -> str:
         ("A study: `config/studies/<name>.yaml`", Study),
         ("`csds.<name>`", Csd),
         ("`csds.<name>.mixture[]`", SizeClass),
+        ("`csds.<name>.lognormal`", Lognormal),
+        ("`csds.<name>.rosin_rammler`", RosinRammler),
         ("`crystallizer`", Crystallizer),
         ("`filter`", Filter),
         ("`material`", Material),

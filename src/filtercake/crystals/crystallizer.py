@@ -17,7 +17,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
+from filtercake.crystals.csd import CrystalSizeDistribution, discretise
+from filtercake.crystals.instruments import MOST_CLASSES
 from filtercake.errors import ConfigError, CrystallizerError, Problem, did_you_mean, shown
 from filtercake.units import MICROMETRE, MINUTE, FloatArray
 from filtercake.user_files import read_yaml

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -15,21 +13,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from filtercake.errors import CsdError, shown
-from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, NUMBER, FloatArray, split_header
-from filtercake.user_files import Unusable, read_text
-
-SUM_TOLERANCE = 0.01
-"""Volume fractions are normalised when their sum is within this of 1; further off is an error."""
-
-LARGEST_FILE = 1_000_000
-"""Bytes of a CSV beyond which it is surely not a size distribution."""
+from filtercake.crystals.instruments import SUM_TOLERANCE, read_classes
+from filtercake.errors import CsdError
+from filtercake.units import MICROMETRE, FloatArray
 
 SMALLEST_SIZE, LARGEST_SIZE = 1e-9, 1.0
 """Diameters, m, that a class may have: far beyond what is filtered, and safe to compute with."""
-
-MOST_CLASSES = 10_000
-"""Classes of a distribution at most."""
 
 SAME_SIZE = 1e-9
 """Relative difference of sizes that is rounding (20 um and 0.02 mm)."""
@@ -48,12 +37,15 @@ class CrystalSizeDistribution:
     x_over_d, x_over_d2 : ndarray, shape (n,), or None
         What each class adds to the sums of x/d (1/m) and x/d^2 (1/m2), where its crystals are of several sizes;
         None where all have the size of their class.
+    understood : str
+        How it was read or made, in words; empty where that needs none.
     """
 
     size: FloatArray
     volume_fraction: FloatArray
     x_over_d: FloatArray | None = None
     x_over_d2: FloatArray | None = None
+    understood: str = ""
 
     @classmethod
     def from_classes(cls, size: ArrayLike, volume_fraction: ArrayLike) -> CrystalSizeDistribution:
@@ -246,36 +238,25 @@ def discretise(
 
 
 def read_csd(path: Path) -> CrystalSizeDistribution:
-    """Read a distribution from a CSV with the columns size and volume_fraction and units in the header.
+    """Read a distribution from a file of a spreadsheet or an instrument; ``understood`` says how.
 
     Parameters
     ----------
     path : Path
-        Header such as ``size_um,volume_fraction`` or ``size (mm),volume_fraction (%)``; rows in any order.
+        As :func:`filtercake.crystals.instruments.read_classes` takes it, for example a CSV with the header
+        ``size_um,volume_fraction``.
 
     Raises
     ------
     CsdError
-        If the file cannot be read, a column or its unit is missing, or the classes are not a distribution.
+        If the file cannot be read, may mean more than one distribution, or its classes are none.
     """
-    rows = _read_rows(path)
-    header = [split_header(cell) for cell in rows[0][1]]
-    if len(rows) - 1 > MOST_CLASSES:
-        raise CsdError(f"{path}: {len(rows) - 1} classes: must be at most {MOST_CLASSES}")
-    size_column, size_factor = _column(path, header, "size", LENGTH_UNITS, default=None)
-    share_column, share_factor = _column(path, header, "volume_fraction", FRACTION_UNITS, default="")
-    for line, row in rows[1:]:
-        if len(row) > len(header):
-            raise CsdError(
-                f"{path}: line {line}: {len(row)} values under {len(header)} columns (decimal commas? use points)"
-            )
+    found = read_classes(path)
     try:
-        sizes = [_number(path, line, row, size_column) * size_factor for line, row in rows[1:]]
-        shares = [_number(path, line, row, share_column) * share_factor for line, row in rows[1:]]
-        return CrystalSizeDistribution.from_classes(sizes, shares)
+        csd = CrystalSizeDistribution.from_classes(found.size, found.volume_fraction)
     except CsdError as error:
-        message = str(error)
-        raise CsdError(message if message.startswith(str(path)) else f"{path}: {message}") from None
+        raise CsdError(f"{path}: {error}") from None
+    return replace(csd, understood=found.understood)
 
 
 def mixture(sizes: Sequence[float], volume_fractions: Sequence[float]) -> CrystalSizeDistribution:
@@ -357,46 +338,3 @@ def _check_classes(sizes: FloatArray, fractions: FloatArray) -> None:
     total = float(fractions.sum())
     if abs(total - 1.0) > SUM_TOLERANCE:
         raise CsdError(f"the volume fractions sum to {total:.6g}; they must sum to 1 within {SUM_TOLERANCE:g}")
-
-
-def _read_rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Rows that are not blank, with their line numbers."""
-    try:
-        reader = csv.reader(io.StringIO(read_text(path, LARGEST_FILE), newline=""))
-        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except Unusable as error:
-        raise CsdError(f"{path}: {error}") from None
-    except csv.Error as error:
-        raise CsdError(f"{path}: is not a CSV file ({error})") from None
-    if len(rows) < 2:
-        raise CsdError(f"{path}: holds no class; the first line names the columns, each further line is a class")
-    return rows
-
-
-def _column(
-    path: Path,
-    header: list[tuple[str, str | None]],
-    name: str,
-    units: dict[str, float],
-    default: str | None,
-) -> tuple[int, float]:
-    """Index of a named column and the factor of its unit."""
-    names = [cell for cell, _ in header]
-    if names.count(name) != 1:
-        raise CsdError(
-            f"{path}: header {shown(names)}: needs exactly one column {name!r} (for example size_um,volume_fraction)"
-        )
-    index = names.index(name)
-    unit = header[index][1]
-    unit = default if unit is None else unit
-    if unit is None or unit not in units:
-        known = ", ".join(key for key in units if key)
-        raise CsdError(f"{path}: column {name!r} has unit {shown(unit)}; name one of {known} in the header")
-    return index, units[unit]
-
-
-def _number(path: Path, line: int, row: list[str], column: int) -> float:
-    text = row[column].strip() if column < len(row) else ""
-    if not NUMBER.fullmatch(text):
-        raise CsdError(f"{path}: line {line}: {shown(text)} is not a number (use a decimal point)")
-    return float(text)

@@ -11,16 +11,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from scipy import special
 
-from filtercake.calibration.fit import CONFIDENCE
 from filtercake.calibration.measurements import Measurements
 from filtercake.figures import style
 from filtercake.packing.engines import label_of
-from filtercake.packing.replication import half_width
+from filtercake.statistics import half_width, quantile
+from filtercake.units import FloatArray
 
-Z = float(special.ndtri(0.5 + 0.5 * CONFIDENCE))
-"""Standard errors from an estimate to the end of its 95 % interval."""
 ESTIMATORS = {"interior": "interior porosity", "paper_count": "porosity counted as in the paper"}
 """Names of estimators in figures; one that is not listed keeps its own."""
 
@@ -104,11 +101,16 @@ def measured_means(data: CalibrationData) -> pd.DataFrame:
         own = data.parity[data.parity["csd"] == csd]
         weight = own["relative_uncertainty"].to_numpy(np.float64) ** -2
         mean = float(np.average(np.log(own["measured_m_kg"].to_numpy(np.float64)), weights=weight))
-        reach = Z / math.sqrt(float(weight.sum()))
+        reach = float(reach_of(own)[0]) / math.sqrt(float(weight.sum()))
         row = {"csd": csd, "measured_m_kg": math.exp(mean), "modelled_m_kg": float(own["modelled_m_kg"].iloc[0])}
         row |= {"measured_low_m_kg": math.exp(mean - reach), "measured_high_m_kg": math.exp(mean + reach)}
         rows.append({**row, "left_out_m_kg": math.exp(mean + float(own["left_out_ln_error"].iloc[0]))})
     return pd.DataFrame(rows)
+
+
+def reach_of(parity: pd.DataFrame) -> FloatArray:
+    """Return the standard errors to the ends of each measurement's 95 % interval; Student's with a scatter."""
+    return np.array([quantile(freedom) for freedom in parity["scatter_freedom"].fillna(math.inf)])
 
 
 def packed_friction(data: CalibrationData) -> float:

@@ -9,18 +9,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
-from scipy import special
 
-from filtercake.calibration.fit import CONFIDENCE
 from filtercake.figures import calibrated, style
 from filtercake.figures.calibrated import CalibrationData
 from filtercake.units import FloatArray
 
-THRESHOLD = float(special.chdtri(1, 1.0 - CONFIDENCE))
-"""Deviance up to which a value belongs to the 95 % interval of one parameter."""
 LEAST_HEIGHT, MOST_HEIGHT = 6.0, 20.0
-"""Deviances at the top of the axes: the threshold is always seen, and so is the minimum."""
-LEVELS = (0.0, 1.0, 2.0, THRESHOLD, 6.0, 10.0, 15.0, MOST_HEIGHT)
+"""Deviances at the top of the axes; the threshold is always seen, and so is the minimum."""
+ABOVE = 1.08
+"""Top of the axes over a threshold that is higher than that."""
+LEVELS = (0.0, 1.0, 2.0, 6.0, 10.0, 15.0, MOST_HEIGHT)
 DEVIANCE = "Deviance above the minimum (–)"
 CHARACTERS = {False: 84, True: 66}
 """Of a line of findings, without and with a scale of colours beside the axes."""
@@ -81,16 +79,17 @@ def _curves(axes: Axes, data: CalibrationData) -> None:
         gid="best",
     )
     _interval(axes, data)
+    threshold = float(data.summary["threshold"])
     axes.axhline(
-        THRESHOLD,
+        threshold,
         color=style.INK,
         linewidth=0.9,
         linestyle=(0, (1, 1.5)),
-        label=f"95 % threshold of one parameter ({THRESHOLD:.2f})",
+        label=f"95 % threshold of one parameter ({threshold:.3g})",
         gid="threshold",
     )
     highest = float(data.objective["deviance"].max())
-    axes.set_ylim(0.0, min(max(1.05 * highest, LEAST_HEIGHT), MOST_HEIGHT))
+    axes.set_ylim(0.0, max(min(max(1.05 * highest, LEAST_HEIGHT), MOST_HEIGHT), ABOVE * threshold))
     axes.set_xlim(float(data.objective["cohesion_kJ_m3"].min()), float(data.objective["cohesion_kJ_m3"].max()))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.set_ylabel(DEVIANCE)
@@ -111,15 +110,16 @@ def _squares(data: CalibrationData) -> str:
 def _interval(axes: Axes, data: CalibrationData) -> None:
     """Shade the cohesions in the 95 % interval, each of its stretches on its own."""
     rows = data.objective[np.isclose(data.objective["friction"], data.friction)]
-    ends = stretches(rows["cohesion_kJ_m3"].to_numpy(np.float64), rows["deviance"].to_numpy(np.float64))
+    cohesion, deviance = (rows[name].to_numpy(np.float64) for name in ("cohesion_kJ_m3", "deviance"))
+    ends = stretches(cohesion, deviance, float(data.summary["threshold"]))
     look: dict[str, Any] = {"color": style.colour(0), "alpha": 0.13, "linewidth": 0.0, "zorder": 0}
     for low, high in ends:
         axes.axvspan(low, high, label="95 % interval", gid="interval", **look)
 
 
-def stretches(values: FloatArray, deviance: FloatArray) -> list[tuple[float, float]]:
-    """Return the ends of every stretch in which a deviance on a grid is under the threshold, ascending."""
-    excess = deviance - THRESHOLD
+def stretches(values: FloatArray, deviance: FloatArray, threshold: float) -> list[tuple[float, float]]:
+    """Return the ends of every stretch in which a deviance on a grid is under a threshold, ascending."""
+    excess = deviance - threshold
     inside = np.concatenate([[False], excess <= 0.0, [False]])
     first, last = np.flatnonzero(~inside[:-1] & inside[1:]), np.flatnonzero(inside[:-1] & ~inside[1:]) - 1
 
@@ -135,13 +135,14 @@ def stretches(values: FloatArray, deviance: FloatArray) -> list[tuple[float, flo
 def _contours(axes: Axes, data: CalibrationData) -> None:
     table = data.objective.pivot(index="friction", columns="cohesion_kJ_m3", values="deviance")
     grid = (table.columns.to_numpy(np.float64), table.index.to_numpy(np.float64), table.to_numpy(np.float64))
-    filled = axes.contourf(*grid, levels=LEVELS, cmap="Blues", extend="max")
+    threshold = float(data.summary["threshold"])
+    filled = axes.contourf(*grid, levels=sorted({*LEVELS, threshold}), cmap="Blues", extend="max")
     bar = axes.figure.colorbar(filled, ax=axes, label=DEVIANCE, pad=0.02)
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
-    if grid[2].max() > THRESHOLD:
-        axes.contour(*grid, levels=[THRESHOLD], colors=style.INK, linewidths=1.1).set_gid("region")
+    if grid[2].max() > threshold:
+        axes.contour(*grid, levels=[threshold], colors=style.INK, linewidths=1.1).set_gid("region")
         axes.plot(
-            [], [], color=style.INK, linewidth=1.1, label=f"95 % region of one parameter (deviance {THRESHOLD:.2f})"
+            [], [], color=style.INK, linewidth=1.1, label=f"95 % region of one parameter (deviance {threshold:.3g})"
         )
     cohesion, friction = data.cohesion, data.estimate("friction")
     _edges(axes, cohesion, friction)

@@ -79,7 +79,8 @@ def _distribution(axes: Axes, data: CalibrationData, csd: str) -> None:
 
 def _measured_interval(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
     measured, relative = (rows[name].to_numpy(np.float64) for name in ("measured_m_kg", "relative_uncertainty"))
-    return measured * np.exp(-calibrated.Z * relative), measured * np.exp(calibrated.Z * relative)
+    factor = np.exp(calibrated.reach_of(rows) * relative)
+    return measured / factor, measured * factor
 
 
 def _left_out(axes: Axes, data: CalibrationData, means: pd.DataFrame) -> None:

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from filtercake.figures import calibrated, style
 from filtercake.figures.calibrated import CalibrationData
+from filtercake.statistics import quantile
 
 TOGETHER = 3
 """Most distributions in one panel."""
@@ -66,7 +67,7 @@ def _response(axes: Axes, data: CalibrationData, csd: str, label: str) -> None:
     cohesion, resistance, error = (
         rows[name].to_numpy(np.float64) for name in ("cohesion_kJ_m3", "resistance_m_kg", "relative_error")
     )
-    ink, reach = style.colour(data.number(csd)), np.exp(calibrated.Z * error)
+    ink, reach = style.colour(data.number(csd)), np.exp(quantile() * error)
     axes.fill_between(
         cohesion, resistance / reach, resistance * reach, color=ink, alpha=0.3, linewidth=0.0, zorder=2, gid="band"
     )

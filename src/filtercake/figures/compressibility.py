@@ -10,11 +10,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from scipy import special
 
 from filtercake.calibration.measurements import Measurement, Measurements, compressibility_by_csd, with_pressure
 from filtercake.figures import style
 from filtercake.filtration.constant_pressure import CompressibilityFit
+from filtercake.statistics import quantile
 from filtercake.units import KILOPASCAL
 
 BEYOND = 1.12
@@ -22,7 +22,6 @@ BEYOND = 1.12
 MOST_DIGITS = 3
 """Digits behind the point of an exponent, at most."""
 LINE, BAND = "line", "band"
-_NORMAL95 = float(special.ndtri(0.975))
 
 
 def draw(measurements: Measurements) -> Figure:
@@ -56,7 +55,7 @@ def _series(
 ) -> None:
     pressure = np.array([entry.pressure_drop or np.nan for entry in entries])
     alpha = np.array([entry.resistance for entry in entries])
-    factor = np.exp(_NORMAL95 * np.array([entry.relative_se for entry in entries]))
+    factor = np.exp(quantile() * np.array([entry.relative_se for entry in entries]))
     ink = style.colour(index)
     drawn = axes.errorbar(
         pressure / KILOPASCAL,

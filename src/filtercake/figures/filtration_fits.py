@@ -10,9 +10,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from filtercake.calibration.measurements import VOLUME_UNITS, BothForms, Measurements
+from filtercake.calibration.measurements import VOLUME_UNITS, Measurements
 from filtercake.figures import style
-from filtercake.filtration.constant_pressure import BoolArray, FiltrationFit, FiltrationTest, disagreement
+from filtercake.filtration.analysis import FiltrationAnalysis
+from filtercake.filtration.constant_pressure import BoolArray, FiltrationTest, disagreement
 from filtercake.units import KILOPASCAL
 
 MOST_PANELS = 24
@@ -32,7 +33,7 @@ INTEGRAL, DIFFERENTIAL, BAND = "integral", "differential", "band"
 
 def draw(measurements: Measurements) -> Figure:
     """Draw one panel per test; readings left out of the integral form's fit are hollow."""
-    shown = list(zip(measurements.tests, measurements.fits, strict=True))[:MOST_PANELS]
+    shown = list(zip(measurements.tests, measurements.results, strict=True))[:MOST_PANELS]
     columns = 1 if len(shown) < 2 else 2 if len(shown) < 5 else 3
     rows = -(-max(len(shown), 1) // columns)
     width = style.SINGLE if columns == 1 else style.DOUBLE
@@ -42,8 +43,8 @@ def draw(measurements: Measurements) -> Figure:
         return figure
     largest = max(float(test.volume.max()) for test, _ in shown)
     unit = "L" if largest >= LITRES_FROM else "mL"
-    for k, (axes, (test, fits)) in enumerate(zip(panels, shown, strict=True)):
-        _panel(axes, test, fits, unit, columns)
+    for k, (axes, (test, found)) in enumerate(zip(panels, shown, strict=True)):
+        _panel(axes, test, found, unit, columns)
         if k >= len(shown) - columns:
             axes.set_xlabel(f"Filtrate volume V ({unit})")
         if k % columns == 0:
@@ -54,12 +55,16 @@ def draw(measurements: Measurements) -> Figure:
 
 
 def _notes(measurements: Measurements, shown: int, panels: list[Axes]) -> list[str]:
-    notes = ["α and Rₘ of the integral form, ± half-widths of 95 % intervals"]
+    notes = ["α and Rₘ with half-widths of 95 % intervals"]
     if any(line.get_gid() == ABOVE for axes in panels for line in axes.get_lines()):
         notes.append("hollow triangles: left out, above the panel")
     if any(test.time.size > MOST_READINGS for test in measurements.tests):
         notes.append("of very many readings only some are drawn")
-    apart = [test.name for test, fits in zip(measurements.tests, measurements.fits, strict=True) if disagreement(*fits)]
+    pairs = list(zip(measurements.tests, measurements.results, strict=True))
+    apart = [test.name for test, found in pairs if disagreement(found.integral, found.differential)]
+    shifted = [f"{test.name} ({found.time_zero:.3g} s)" for test, found in pairs if found.time_zero != 0.0]
+    if shifted:
+        notes.append(f"time zero fitted: {', '.join(shifted)}")
     if apart:
         notes.append(f"integral and differential form disagree: {', '.join(apart)}")
     if len(measurements.tests) > shown:
@@ -67,15 +72,17 @@ def _notes(measurements: Measurements, shown: int, panels: list[Axes]) -> list[s
     return notes
 
 
-def _panel(axes: Axes, test: FiltrationTest, fits: BothForms, unit: str, columns: int) -> None:
+def _panel(axes: Axes, test: FiltrationTest, found: FiltrationAnalysis, unit: str, columns: int) -> None:
     scale = VOLUME_UNITS[unit]
     largest = float(test.volume.max())
     volume = np.linspace(0.0, largest, 201)[1:]
-    line, half = (values * scale for values in fits.integral.time_per_volume(volume))
     # from its first reading on: nearer to V = 0 its own beginning, t0/V, grows without bound
-    own = volume[volume >= test.volume[fits.differential.kept][0]]
-    other = fits.differential.time_per_volume(own)[0] * scale
-    top = _readings(axes, test, fits.integral.kept, float(max((line + half)[-1], other[-1])), scale)
+    own = volume[volume >= test.volume[found.differential.kept][0]]
+    if found.time_zero != 0.0:
+        volume = own
+    line, half = (values * scale for values in found.integral.time_per_volume(volume))
+    other = found.differential.time_per_volume(own)[0] * scale
+    top = _readings(axes, test, found.integral.kept, float(max((line + half)[-1], other[-1])), scale)
     x, ink = volume / scale, style.colour(0)
     axes.plot(x, line, color=ink, label="integral form", gid=INTEGRAL, zorder=2)
     axes.fill_between(
@@ -87,7 +94,7 @@ def _panel(axes: Axes, test: FiltrationTest, fits: BothForms, unit: str, columns
     room = LONGEST_NAME if columns < 3 else LONGEST_OF_THREE
     below = _short(test.csd, room - 10)  # beside the pressure
     axes.set_title(f"{_short(test.name, room)}\n{below}, {test.pressure_drop / KILOPASCAL:g} kPa", loc="left")
-    results = "\n".join(_results(fits.integral))
+    results = "\n".join(_results(found))
     size = 7.0 if columns < 3 else 6.2
     axes.text(0.98, 0.03, results, transform=axes.transAxes, ha="right", va="bottom", fontsize=size)
 
@@ -115,18 +122,18 @@ def _short(name: str, room: int) -> str:
     return name if len(name) <= room else name[: room - 1] + "…"
 
 
-def _results(fit: FiltrationFit) -> list[str]:
+def _results(found: FiltrationAnalysis) -> list[str]:
     return [
-        f"α = {with_interval(fit.resistance, fit.resistance_ci95)} m/kg",
-        f"Rₘ = {with_interval(fit.medium_resistance, fit.medium_resistance_ci95)} 1/m",
+        f"α = {with_interval(found.resistance, found.resistance_ci95)} m/kg",
+        f"Rₘ = {with_interval(found.medium_resistance, found.medium_resistance_ci95)} 1/m",
     ]
 
 
 def with_interval(value: float, half: float) -> str:
     """Write a value and its half-width, with two digits of the latter, in a power of ten."""
     largest = max(abs(value), half)
-    if not (math.isfinite(largest) and largest > 0.0):
-        return f"{value:g} ± {half:g}"
+    if not (math.isfinite(value + half) and largest > 0.0):
+        return f"{value:.4g} ± {half:g}".replace("nan", "–")
     exponent = math.floor(math.log10(largest))
     scaled, reach = value / 10.0**exponent, half / 10.0**exponent
     digits = min(max(1 - math.floor(math.log10(reach)), 0), MOST_DIGITS) if reach > 0.0 else MOST_DIGITS

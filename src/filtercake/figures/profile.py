@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from filtercake.figures import selection, style
 from filtercake.figures.selection import StudyData
 from filtercake.packing.porosity import porosity_profile
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import bed_height, interior_slab
+from filtercake.statistics import half_width
 from filtercake.units import MICROMETRE, FloatArray
 
 SLICES_PER_DIAMETER = 20

@@ -14,6 +14,7 @@ from filtercake.crystals.crystallizer import SteadyState
 from filtercake.crystals.csd import FullAndTruncated, read_tables
 from filtercake.errors import PackingRejected
 from filtercake.packing.result import Packing, read_record
+from filtercake.results.tables import read_table
 from filtercake.study.config.published import Published
 from filtercake.study.config.study import Study
 from filtercake.study.points import base_rows
@@ -64,12 +65,12 @@ class StudyData:
         return cls(
             name=name,
             study=Study.model_validate(study),
-            points=pd.read_csv(folder / "points.csv"),
-            summary=pd.read_csv(folder / "summary.csv"),
-            replicates=pd.read_csv(folder / "replicates.csv"),
+            points=read_table(folder / "points.csv"),
+            summary=read_table(folder / "summary.csv"),
+            replicates=read_table(folder / "replicates.csv"),
             csds=read_tables(csds),
             packings=folder / "packings",
-            crystallizer=next(map(pd.read_csv, crystallizer), pd.DataFrame()),
+            crystallizer=next(map(read_table, crystallizer), pd.DataFrame()),
         )
 
 

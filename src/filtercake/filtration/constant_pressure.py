@@ -24,15 +24,14 @@ make errors of the times that grow with V, 0.935 to 0.99, where ordinary errors 
 different readings are supposed independent: a slow drift of the pressure is not in the interval, nor is an error of c,
 mu, A or dP.
 
-Start-up
---------
-A test begins before its pressure is constant and before the first crystals have bridged the medium. Readings at the
-start are left out by a rule: fit the later half of the readings; take the next earlier one as long as it lies within
-its prediction interval, and fit again with it; at the first one outside, leave it and all before it out. The intervals
-are two-sided and together hold all readings of an undisturbed test with a probability of 99 % (1 % divided by the
-number of readings that can be tested). The scaled prediction errors are the recursive residuals of Brown, Durbin &
-Evans, J. R. Stat. Soc. B 37 (1975) 149: independent, so that the 1 % holds for the whole search. A disturbance that
-fades slowly may pass reading by reading; what it does to the time zero then shows where the two forms disagree.
+Few readings
+------------
+Fewer than ``FEWEST_WITH_SCATTER`` readings say nothing of their errors: two determine a line exactly. Then every time
+and every volume is taken to err by ``reading_error`` of its value, independently, and the interval is the normal one
+(or Student's, where three or four readings scatter more than that).
+
+Which readings are used, and how their errors grow, is the caller's choice: see
+:mod:`filtercake.filtration.analysis`.
 """
 
 from __future__ import annotations
@@ -43,32 +42,33 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from filtercake.errors import FiltrationError
+from filtercake.statistics import quantile
 from filtercake.units import FloatArray
 
 BoolArray = NDArray[np.bool_]
 Form = Literal["integral", "differential"]
 
-MINIMUM_READINGS: Final = 5
-"""Readings below which a test is refused: two more than the differential form has unknowns."""
+MINIMUM_READINGS: Final = 2
+"""Readings below which a test is refused: a line needs two."""
 
-OUTLIER_PROBABILITY: Final = 0.01
-"""Probability that an undisturbed test loses any reading at its start."""
+FEWEST_WITH_SCATTER: Final = 5
+"""Readings from which their scatter tells their errors: two more than the differential form has unknowns."""
+
+READING_ERROR: Final = 0.02
+"""Standard error of a reading of time or volume over its value, where nothing else is known."""
 
 ROUND_OFF: Final = 1e-9
-"""Deviations below this share are round-off: of a reading from its prediction over the longest time, and of one form's
-result from the other's."""
+"""One form's result differs from the other's by round-off alone below this share."""
 
 REFERENCE_PRESSURE: Final = 100e3
 """Pressure drop at which a compressible cake's resistance is quoted unless another is asked for, Pa."""
 
-_CONFIDENCE: Final = 0.95
+ALL: Final = slice(None)
+"""Every reading of a test."""
 _POWERS: Final[dict[Form, tuple[int, ...]]] = {"integral": (1, 2), "differential": (0, 1, 2)}
 _SLOPE_OVER_CURVATURE: Final[dict[Form, float]] = {"integral": 1.0, "differential": 2.0}
-_SPARE: Final = 2
-"""Readings that the first fit of the start-up search has beyond its unknowns, at least."""
 _WORST_CONDITION: Final = 1e9
 _MILLILITRE: Final = 1e-6
 
@@ -84,7 +84,7 @@ class FiltrationTest:
     csd : str
         Name of the crystals' size distribution.
     time : ndarray, shape (n,)
-        Times of the readings since the filtration began, s; positive and ascending.
+        Times of the readings since the filtration began, s; positive (or 0 without a known zero) and ascending.
     volume : ndarray, shape (n,)
         Volumes of filtrate, m3; positive.
     area : float
@@ -97,6 +97,12 @@ class FiltrationTest:
         Dry cake mass c per volume of filtrate, kg/m3.
     notes : tuple of str
         Repairs made when the readings were read.
+    lines : tuple of int
+        Line of each reading in its file; empty where it has none.
+    known_zero : bool
+        Whether the clock was, as far as anyone knows, started with the filtration.
+    reading_error : float
+        Relative standard error of a time or volume, for tests of too few readings to tell.
 
     Raises
     ------
@@ -113,6 +119,9 @@ class FiltrationTest:
     viscosity: float
     solids_per_filtrate: float
     notes: tuple[str, ...] = ()
+    lines: tuple[int, ...] = ()
+    known_zero: bool = True
+    reading_error: float = READING_ERROR
 
     def __post_init__(self) -> None:
         _check_readings(self)
@@ -121,10 +130,19 @@ class FiltrationTest:
             ("pressure_drop", "Pa"),
             ("viscosity", "Pa s"),
             ("solids_per_filtrate", "kg/m3"),
+            ("reading_error", ""),
         ):
             value = getattr(self, key)
             if not 0.0 < value < math.inf:
-                raise FiltrationError(f"{self.name}: {key} = {value:g} {unit}: must be positive and finite")
+                raise FiltrationError(
+                    f"{self.name}: {key} = {value:g} {unit}".rstrip() + ": must be positive and finite"
+                )
+
+    def named(self, first: int, last: int) -> str:
+        """Name the readings first..last-1 by their lines, or else by their numbers."""
+        kind, numbers = ("line", self.lines) if self.lines else ("reading", tuple(range(1, self.time.size + 1)))
+        one, other = numbers[first], numbers[last - 1]
+        return f"{kind} {one}" if one == other else f"{kind}s {one} to {other}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,14 +163,16 @@ class FiltrationFit:
         Of the form's straight line against V, s/m6.
     intercept : float
         Of that line, s/m3.
-    n, dof : int
-        Readings used, and degrees of freedom.
+    n : int
+        Readings used.
+    dof : float
+        Degrees of freedom of the errors; infinite where they are the stated ones.
     kept : ndarray of bool, shape (readings,)
         Which readings were used.
     notes : tuple of str
-        What is doubtful, and what was left out.
+        What is doubtful.
     time_offset : float
-        Time at which the fitted filtration begins, s; 0 by definition for the integral form.
+        Time at which the filtration begins, s; in the integral form as it was given.
     covariance : ndarray, shape (3, 3)
         Of time_offset, intercept and slope.
     """
@@ -167,7 +187,7 @@ class FiltrationFit:
     slope: float
     intercept: float
     n: int
-    dof: int
+    dof: float
     kept: BoolArray
     notes: tuple[str, ...]
     time_offset: float
@@ -191,28 +211,34 @@ class FiltrationFit:
         line = rows @ np.array([self.time_offset, self.intercept, self.slope])
         variance = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)
         # round-off may leave a variance of nothing a little below it
-        return np.asarray(line), np.asarray(_quantile(self.dof) * np.sqrt(np.maximum(variance, 0.0)))
+        return np.asarray(line), np.asarray(quantile(self.dof) * np.sqrt(np.maximum(variance, 0.0)))
 
 
-def fit_integral(test: FiltrationTest, *, trim: bool = True) -> FiltrationFit:
+def fit_integral(
+    test: FiltrationTest, used: slice = ALL, *, time_zero: float = 0.0, growth: float = 0.0
+) -> FiltrationFit:
     """Fit the integral form: t/V against V with weights V^2, i.e. t = b V + a V^2.
 
     Parameters
     ----------
     test : FiltrationTest
         The test.
-    trim : bool
-        Whether a disturbed start-up is left out (see the module's docstring).
+    used : slice
+        The readings to use.
+    time_zero : float
+        Time of the clock at which the filtration began, s.
+    growth : float
+        The standard deviation of a time's error grows with V to this power.
 
     Raises
     ------
     FiltrationError
         If the volumes hardly differ, or the resistance is not positive.
     """
-    return _fit(test, "integral", trim)
+    return _fit(test, "integral", used, time_zero, growth)
 
 
-def fit_differential(test: FiltrationTest, *, trim: bool = True) -> FiltrationFit:
+def fit_differential(test: FiltrationTest, used: slice = ALL, *, growth: float = 0.0) -> FiltrationFit:
     """Fit the differential form, dt/dV against V, in the way that knows how differences of readings err.
 
     The difference quotient of two readings is the derivative at their mean volume, exactly. Neighbouring quotients
@@ -223,17 +249,15 @@ def fit_differential(test: FiltrationTest, *, trim: bool = True) -> FiltrationFi
 
     Parameters
     ----------
-    test : FiltrationTest
-        The test.
-    trim : bool
-        Whether a disturbed start-up is left out (see the module's docstring).
+    test, used, growth
+        As for :func:`fit_integral`.
 
     Raises
     ------
     FiltrationError
         If the volumes hardly differ, or the resistance is not positive.
     """
-    return _fit(test, "differential", trim)
+    return _fit(test, "differential", used, 0.0, growth)
 
 
 def disagreement(integral: FiltrationFit, differential: FiltrationFit) -> str | None:
@@ -367,9 +391,9 @@ def _power_law(x: FloatArray, y: FloatArray, error: FloatArray | None) -> tuple[
     quantile2 = math.nan
     if dof > 0:
         spread2 = float(np.sum((y * weight - design @ np.array([level, slope])) ** 2)) / dof
-        quantile2 = spread2 * _quantile(dof) ** 2
+        quantile2 = spread2 * quantile(dof) ** 2
         if error is not None:
-            quantile2 = max(quantile2, float(special.ndtri(0.5 + _CONFIDENCE / 2.0)) ** 2)
+            quantile2 = max(quantile2, quantile() ** 2)
     at_centre = np.diag(quantile2 / squared) if dof > 0 else np.full((2, 2), math.nan)
     move = np.array([[1.0, -centre], [0.0, 1.0]])
     return move @ np.array([level, slope]), np.asarray(move @ at_centre @ move.T)
@@ -383,24 +407,29 @@ def _power_law_notes(points: int, pressures: int) -> tuple[str, ...]:
     return ()
 
 
-def _fit(test: FiltrationTest, form: Form, trim: bool) -> FiltrationFit:
+def _fit(test: FiltrationTest, form: Form, used: slice, time_zero: float, growth: float) -> FiltrationFit:
     powers, largest, longest = np.array(_POWERS[form]), float(test.volume.max()), float(test.time.max())
-    design, time = (test.volume / largest)[:, None] ** powers, test.time / longest
-    start = _later_half(*design.shape)
-    _require_spread(test.name, design[start:] if trim else design, form)
-    kept = _undisturbed(design, time, start) if trim else np.ones(time.size, dtype=np.bool_)
-    scaled, covariance = _least_squares(design[kept], time[kept])
-    # t0, b and a of t = t0 + b V + a V^2; t0 is 0 in the integral form; the differential form's slope is 2 a
+    kept = np.zeros(test.time.size, dtype=np.bool_)
+    kept[used] = True
+    volume, time = test.volume[kept] / largest, (test.time[kept] - time_zero) / longest
+    design = volume[:, None] ** powers
+    _require_spread(test.name, design, form)
+    if time.size < FEWEST_WITH_SCATTER:
+        scaled, covariance, dof = _with_stated_errors(design, time, volume, test.reading_error)
+    else:
+        scaled, covariance = _least_squares(design, time, volume**-growth)
+        dof = float(time.size - powers.size)
+    # t0, b and a of t = t0 + b V + a V^2; t0 is given in the integral form; the differential form's slope is 2 a
     scale = longest / largest**powers
     scale[-1] *= _SLOPE_OVER_CURVATURE[form]
-    whole, errors = np.zeros(3), np.zeros((3, 3))
+    whole, errors = np.array([time_zero, 0.0, 0.0]), np.zeros((3, 3))
     whole[-powers.size :] = scaled * scale
     errors[-powers.size :, -powers.size :] = covariance * np.outer(scale, scale)
-    return _result(test, form, kept, whole, errors)
+    return _result(test, form, kept, whole, errors, dof)
 
 
 def _result(
-    test: FiltrationTest, form: Form, kept: BoolArray, coefficients: FloatArray, covariance: FloatArray
+    test: FiltrationTest, form: Form, kept: BoolArray, coefficients: FloatArray, covariance: FloatArray, dof: float
 ) -> FiltrationFit:
     """Turn the form's line into resistances and say what is doubtful about them."""
     offset, intercept, slope = (float(value) for value in coefficients)
@@ -409,13 +438,12 @@ def _result(
     alpha, medium = slope * per_slope, intercept * driving
     _, medium_se, alpha_se = np.sqrt(np.diag(covariance)) * [1.0, driving, per_slope]
     n = int(kept.sum())
-    dof = n - len(_POWERS[form])
     if not alpha > 0.0:
         raise FiltrationError(
             f"{test.name}: the {form} form gives a cake resistance of {alpha:.4g} m/kg: must be positive; the readings "
             "do not slow down as a growing cake makes them (is the test long enough, is the pressure constant?)"
         )
-    alpha_ci, medium_ci = float(_quantile(dof) * alpha_se), float(_quantile(dof) * medium_se)
+    alpha_ci, medium_ci = float(quantile(dof) * alpha_se), float(quantile(dof) * medium_se)
     return FiltrationFit(
         form=form,
         resistance=alpha,
@@ -429,18 +457,10 @@ def _result(
         n=n,
         dof=dof,
         kept=kept,
-        notes=(*_left_out_notes(test, kept), *_doubts(alpha, alpha_ci, medium, medium_ci)),
+        notes=_doubts(alpha, alpha_ci, medium, medium_ci),
         time_offset=offset,
         covariance=covariance,
     )
-
-
-def _left_out_notes(test: FiltrationTest, kept: BoolArray) -> tuple[str, ...]:
-    out = int(kept.size - kept.sum())
-    if not out:
-        return ()
-    last = f"{test.time[out - 1]:.4g} s, {test.volume[out - 1] / _MILLILITRE:.4g} mL"
-    return (f"start-up: the first {out} of {kept.size} readings are left out (to {last})",)
 
 
 def _doubts(alpha: float, alpha_ci: float, medium: float, medium_ci: float) -> tuple[str, ...]:
@@ -454,46 +474,12 @@ def _doubts(alpha: float, alpha_ci: float, medium: float, medium_ci: float) -> t
     return tuple(notes)
 
 
-def _later_half(readings: int, unknowns: int) -> int:
-    """Index of the reading that the later half, or what the unknowns need, begins with."""
-    return max(readings - max(-(-readings // 2), unknowns + _SPARE), 0)
-
-
-def _undisturbed(design: FloatArray, time: FloatArray, start: int) -> BoolArray:
-    """Mark the readings from the end back to the first outlier; shapes (n, p), (n,) to (n,).
-
-    All fits of the search come from running sums: the basis is orthonormal and what the whole fit explains is taken
-    away first, so that nothing cancels.
-    """
-    kept = np.ones(time.size, dtype=np.bool_)
-    if start == 0:
-        return kept
-    basis = np.linalg.qr(design)[0]
-    back, rest = basis[::-1], (time - basis @ (basis.T @ time))[::-1]
-    first = time.size - start
-    gram = np.cumsum(back[:, :, None] * back[:, None, :], axis=0)[first - 1 : -1]
-    moment = np.cumsum(back * rest[:, None], axis=0)[first - 1 : -1]
-    rows = back[first:]
-    expected = np.einsum("ij,ij->i", rows, np.linalg.solve(gram, moment[:, :, None])[:, :, 0])
-    leverage = np.einsum("ij,ij->i", rows, np.linalg.solve(gram, rows[:, :, None])[:, :, 0])
-    # recursive residuals: their squares add up to the sum of squares of every longer fit
-    surprise = np.abs(rest[first:] - expected) / np.sqrt(1.0 + leverage)
-    begin = rest[:first] - back[:first] @ np.linalg.solve(gram[0], moment[0])
-    squares = float(begin @ begin) + np.concatenate([[0.0], np.cumsum(surprise**2)[:-1]])
-    dof = np.arange(first, time.size) - design.shape[1]
-    quantile = special.stdtrit(dof, 1.0 - 0.5 * OUTLIER_PROBABILITY / start)
-    outside = surprise > np.maximum(quantile * np.sqrt(squares / dof), ROUND_OFF)
-    if outside.any():
-        kept[: start - int(np.argmax(outside))] = False
-    return kept
-
-
-def _least_squares(design: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _least_squares(design: FloatArray, time: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Coefficients (p,) and their HC3 covariance (p, p)."""
-    q, r = np.linalg.qr(design)
+    q, r = np.linalg.qr(design * weight[:, None])
     inverse = np.linalg.inv(r)
-    coefficients = inverse @ (q.T @ time)
-    residual = time - design @ coefficients
+    coefficients = inverse @ (q.T @ (time * weight))
+    residual = (time - design @ coefficients) * weight
     free = 1.0 - np.sum(q**2, axis=1)
     common = float(residual @ residual) / (time.size - design.shape[1])
     # a reading that alone decides a coefficient has no residual: it errs like the others
@@ -502,8 +488,25 @@ def _least_squares(design: FloatArray, time: FloatArray) -> tuple[FloatArray, Fl
     return np.asarray(coefficients), np.asarray(inverse @ (q.T * variance) @ q @ inverse.T)
 
 
-def _quantile(dof: int) -> float:
-    return float(special.stdtrit(dof, 0.5 + _CONFIDENCE / 2.0))
+def _with_stated_errors(
+    design: FloatArray, time: FloatArray, volume: FloatArray, error: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Coefficients, their covariance and its degrees of freedom where readings are too few to tell their errors.
+
+    An error of the volume is one of the time, times the slope dt/dV.
+    """
+    first = np.linalg.lstsq(design, time, rcond=None)[0]
+    powers = np.arange(3 - design.shape[1], 3)
+    slope = np.where(powers > 0, powers * volume[:, None] ** np.maximum(powers - 1, 0), 0.0) @ first
+    sd = error * np.hypot(time, volume * slope)
+    q, r = np.linalg.qr(design / sd[:, None])
+    inverse = np.linalg.inv(r)
+    coefficients = inverse @ (q.T @ (time / sd))
+    dof = time.size - design.shape[1]
+    squares = float(np.sum(((time - design @ coefficients) / sd) ** 2))
+    if dof > 0 and squares > dof:  # they scatter more than was stated
+        return coefficients, inverse @ inverse.T * squares / dof, float(dof)
+    return coefficients, inverse @ inverse.T, math.inf
 
 
 def _check_readings(test: FiltrationTest) -> None:
@@ -512,7 +515,8 @@ def _check_readings(test: FiltrationTest) -> None:
     if test.time.size < MINIMUM_READINGS:
         raise FiltrationError(f"{test.name}: {test.time.size} readings: must be at least {MINIMUM_READINGS}")
     for key, unit, values in (("time", "s", test.time), ("volume", "m3", test.volume)):
-        bad = ~((values > 0.0) & (values < math.inf))
+        least = -math.ulp(0.0) if key == "time" and not test.known_zero else 0.0
+        bad = ~((values > least) & (values < math.inf))
         if bad.any():
             raise FiltrationError(f"{test.name}: {key} = {values[bad][0]:g} {unit}: must be positive and finite")
     back = np.flatnonzero(np.diff(test.time) <= 0.0)
@@ -523,10 +527,10 @@ def _check_readings(test: FiltrationTest) -> None:
 
 def _require_spread(name: str, design: FloatArray, form: Form) -> None:
     """Refuse readings whose volumes hardly differ: they decide no line."""
-    if np.linalg.cond(design) > _WORST_CONDITION:
+    if design.shape[0] < design.shape[1] or np.linalg.cond(design) > _WORST_CONDITION:
         raise FiltrationError(
-            f"{name}: the volumes of the later readings hardly differ, and the {form} form needs them to: leave out "
-            "what was read after the filtration ended"
+            f"{name}: the volumes of the readings hardly differ, and the {form} form needs them to: leave out what was "
+            "read after the filtration ended"
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError
+from filtercake.packing.representation import merge_rare
 from filtercake.units import MICROMETRE, FloatArray, IntArray
 
 MAX_ATTEMPTS = 4_000_000
@@ -131,7 +132,8 @@ def make_cloud(
     csd : CrystalSizeDistribution
         The (truncated) distribution to pack.
     particles : int
-        Number of spheres; class counts follow by largest remainder.
+        Number of spheres; rare classes are merged (:func:`filtercake.packing.representation.merge_rare`), counts
+        follow by largest remainder.
     void_fraction : float
         Initial void fraction of the region 0..2cL; 0.65, or 0.60 for broad distributions.
     seed : int
@@ -148,8 +150,9 @@ def make_cloud(
 
     if particles < 1:
         raise CloudError("the cloud holds no sphere; particles must be at least 1")
-    counts = csd.class_counts(particles)
-    radius = np.repeat(0.5 * csd.size[::-1], counts[::-1])
+    packed = merge_rare(csd, particles)
+    counts = packed.class_counts(particles)
+    radius = np.repeat(0.5 * packed.size[::-1], counts[::-1])
     length = box_length(csd, particles, void_fraction, bed_depth_factor)
     if 2.0 * radius[0] > length:
         raise CloudError(

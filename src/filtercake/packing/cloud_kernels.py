@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from filtercake.packing.compiled import cached_njit
 from filtercake.units import FloatArray, IntArray
 
 
-@njit(cache=True)
+@cached_njit
 def place(
     position: FloatArray,
     radius: FloatArray,
@@ -47,7 +47,7 @@ def place(
     return n
 
 
-@njit(cache=True)
+@cached_njit
 def _cell(x: float, y: float, z: float, height: float, cells: IntArray) -> int:
     cx = min(int(x * cells[0]), cells[0] - 1)
     cy = min(int(y * cells[1]), cells[1] - 1)
@@ -55,7 +55,7 @@ def _cell(x: float, y: float, z: float, height: float, cells: IntArray) -> int:
     return int((cz * cells[1] + cy) * cells[0] + cx)
 
 
-@njit(cache=True)
+@cached_njit
 def _is_free(
     x: float,
     y: float,

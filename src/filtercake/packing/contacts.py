@@ -10,6 +10,9 @@ import scipy
 from filtercake.packing.cloud import size_levels
 from filtercake.units import FloatArray, IntArray
 
+NODES = 48
+"""Heights at which a lens is cut when a plane passes through it."""
+
 
 @dataclass(frozen=True)
 class Contacts:
@@ -61,6 +64,84 @@ def relative_overlap(contacts: Contacts, radius: FloatArray) -> FloatArray:
     """Overlap of each pair over the diameter of its smaller sphere, shape (m,)."""
     smaller = np.minimum(radius[contacts.pairs[:, 0]], radius[contacts.pairs[:, 1]])
     return np.asarray(contacts.overlap / (2.0 * smaller))
+
+
+def lens_volume(contacts: Contacts, radius: FloatArray) -> FloatArray:
+    """Volume that the two spheres of each pair share, m3, shape (m,), in closed form.
+
+    ``pi (R_i + R_j - r)^2 (r^2 + 2 r (R_i + R_j) - 3 (R_i - R_j)^2) / (12 r)``; a sphere that lies wholly inside the
+    other shares all of its volume.
+    """
+    first, second = (radius[contacts.pairs[:, k]] for k in (0, 1))
+    total, depth = first + second, contacts.overlap
+    distance = total - depth
+    smaller = np.minimum(first, second)
+    inside = distance <= np.abs(first - second)
+    safe = np.where(inside, 1.0, distance)
+    lens = np.pi * depth**2 * (safe**2 + 2.0 * safe * total - 3.0 * (first - second) ** 2) / (12.0 * safe)
+    return np.asarray(np.where(inside, 4.0 / 3.0 * np.pi * smaller**3, lens))
+
+
+def lens_volume_below(
+    height: float, contacts: Contacts, position: FloatArray, radius: FloatArray, length: float
+) -> float:
+    """Volume below a horizontal plane that pairs of spheres share, m3, summed over all pairs.
+
+    Lenses that the plane cuts are integrated over height, with the area that two circles share in closed form.
+
+    Parameters
+    ----------
+    height : float
+        Height of the plane, m.
+    contacts : Contacts
+        The overlapping pairs.
+    position, radius : ndarray, shapes (n, 3) and (n,)
+        Centres and radii, m.
+    length : float
+        Side of the box, periodic in x and y, m.
+    """
+    i, j = contacts.pairs[:, 0], contacts.pairs[:, 1]
+    apart = position[j] - position[i]
+    apart[:, :2] -= length * np.round(apart[:, :2] / length)
+    top = position[i, 2] + _lens_top(apart, radius[i], radius[j])
+    bottom = position[i, 2] - _lens_top(apart * [1.0, 1.0, -1.0], radius[i], radius[j])
+    whole = lens_volume(contacts, radius)[top <= height].sum()
+    cut = (bottom < height) & (height < top)
+    if not cut.any():
+        return float(whole)
+    i, j, bottom, side = i[cut], j[cut], bottom[cut], apart[cut, :2]
+    # z = middle - half cos(t): the square roots at both ends of a lens become smooth
+    angle, weight = np.polynomial.legendre.leggauss(NODES)
+    angle, weight = 0.5 * np.pi * (angle + 1.0), 0.5 * np.pi * weight
+    half = 0.5 * (height - bottom)[:, np.newaxis]
+    z = bottom[:, np.newaxis] + half * (1.0 - np.cos(angle))
+    squares = [np.maximum(radius[k, np.newaxis] ** 2 - (z - position[k, 2, np.newaxis]) ** 2, 0.0) for k in (i, j)]
+    area = shared_area(squares[0], squares[1], np.sum(side**2, axis=1)[:, np.newaxis])
+    return float(whole + np.sum(half * np.sin(angle) * area * weight))
+
+
+def _lens_top(apart: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+    """Height of the lens's highest point over the first centre: a pole inside the other sphere, or on their circle."""
+    up = apart[:, 2]
+    distance = np.sqrt(np.sum(apart**2, axis=1))
+    sideways = np.sum(apart[:, :2] ** 2, axis=1)
+    along = (distance**2 + first**2 - second**2) / (2.0 * distance)
+    circle = np.sqrt(np.maximum(first**2 - along**2, 0.0))
+    on_circle = along * up / distance + circle * np.sqrt(sideways) / distance
+    own_pole = sideways + (first - up) ** 2 <= second**2
+    other_pole = sideways + (up + second) ** 2 <= first**2
+    return np.asarray(np.where(own_pole, first, np.where(other_pole, up + second, on_circle)))
+
+
+def shared_area(first: FloatArray, second: FloatArray, distance: FloatArray) -> FloatArray:
+    """Area that two circles share, from the squares of their radii and of the distance of their centres."""
+    a, b, d = np.sqrt(first), np.sqrt(second), np.sqrt(np.maximum(distance, np.finfo(np.float64).tiny))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alpha = np.arccos(np.clip((distance + first - second) / (2.0 * d * a), -1.0, 1.0))
+        beta = np.arccos(np.clip((distance + second - first) / (2.0 * d * b), -1.0, 1.0))
+        lens = first * (alpha - 0.5 * np.sin(2.0 * alpha)) + second * (beta - 0.5 * np.sin(2.0 * beta))
+    apart, inside = d >= a + b, d <= np.abs(a - b)
+    return np.asarray(np.where(apart, 0.0, np.where(inside, np.pi * np.minimum(first, second), lens)))
 
 
 def floor_overlap(position: FloatArray, radius: FloatArray) -> FloatArray:

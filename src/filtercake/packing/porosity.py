@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from filtercake.packing import contact_law
+from filtercake.packing.contacts import find_contacts, lens_volume_below
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
 from filtercake.packing.slab import Slab, bed_height, interior_slab
@@ -57,12 +58,15 @@ def slab_porosity(position: FloatArray, radius: FloatArray, length: float, slab:
     ------
     ValueError
         If the slab has no thickness.
+
+    Notes
+    -----
+    What two spheres share counts once; what three share at a point, in contacts deeper than any that is accepted,
+    counts as if only pairs did.
     """
     if slab.thickness <= 0.0:
         raise ValueError(f"the slab {slab.lower:g}..{slab.upper:g} m has no thickness")
-    z = position[:, 2]
-    solids = volume_below(slab.upper, z, radius) - volume_below(slab.lower, z, radius)
-    return 1.0 - float(solids.sum()) / (length**2 * slab.thickness)
+    return float(porosity_profile(position, radius, length, np.array([slab.lower, slab.upper]))[0])
 
 
 def paper_count_porosity(
@@ -82,7 +86,14 @@ def porosity_profile(position: FloatArray, radius: FloatArray, length: float, ed
 
     Positions (n, 3), radii (n,), the side of the periodic box and the ascending edges in m.
     """
-    below = np.array([volume_below(edge, position[:, 2], radius).sum() for edge in edges])
+    contacts = find_contacts(position, radius, length)
+    below = np.array(
+        [
+            volume_below(edge, position[:, 2], radius).sum()
+            - lens_volume_below(edge, contacts, position, radius, length)
+            for edge in edges
+        ]
+    )
     return np.asarray(1.0 - np.diff(below) / (length**2 * np.diff(edges)))
 
 

@@ -4,36 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-from scipy import special
-
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
-from filtercake.units import FloatArray
+from filtercake.statistics import half_width
 
-CONFIDENCE = 0.95
 LEAST_REPLICATES = 6
 """Packings before an interval is believed: with fewer, a lucky small spread ends the search too soon."""
 TIMES_NARROW = 2
 """Packings on end after which the interval must be narrow enough, for the same reason."""
-
-
-def half_width(values: FloatArray, confidence: float = CONFIDENCE) -> float:
-    """Half-width of the Student t confidence interval of a mean; nan for fewer than two values.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Independent values.
-    confidence : float
-        Confidence level.
-    """
-    n = values.size
-    if n < 2:
-        return float("nan")
-    quantile = float(special.stdtrit(n - 1, 0.5 + confidence / 2.0))
-    return quantile * float(np.std(values, ddof=1)) / float(np.sqrt(n))
 
 
 class UntilNarrow:
@@ -63,4 +42,4 @@ class UntilNarrow:
     @property
     def half_width(self) -> float:
         """Half-width of the interval so far; nan before the second packing."""
-        return half_width(np.array(self.values))
+        return half_width(self.values)

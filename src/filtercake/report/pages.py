@@ -15,6 +15,7 @@ from filtercake.packing.engines import label_of
 from filtercake.packing.result import publish
 from filtercake.report import words
 from filtercake.report.catalogue import PAGES
+from filtercake.results.tables import read_table
 from filtercake.study.config.study import Study
 from filtercake.user_files import templates
 
@@ -66,7 +67,7 @@ def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Map
     for name, spec in PAGES.items():
         path = folder / spec.file
         if spec.file and path.exists():
-            table = pd.read_csv(path)
+            table = read_table(path)
             if len(table):
                 found[name] = Content(spec.lead, table, path.read_bytes())
     found["table3"] = Content(PAGES["table3"].lead, parameters(study))

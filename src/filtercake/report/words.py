@@ -82,11 +82,13 @@ def number(value: float, digits: int = 4) -> str:
 def with_interval(value: float, half: float, unit: str = "") -> str:
     """Write a value and the half-width of its 95 % interval, with two digits of the latter, and their unit.
 
-    A half-width that is not finite (a single packing) is left out.
+    A half-width that is not known (a single packing) is a dash.
     """
     behind = f" {unit}" if unit else ""
-    if not (math.isfinite(half) and math.isfinite(value) and half > 0.0):
-        return f"{number(value)}{behind}" if math.isfinite(value) else "no accepted packing"
+    if not math.isfinite(value):
+        return "no accepted packing"
+    if not half > 0.0:
+        return f"{number(value)} ± {number(half)}{behind}"
     largest = max(abs(value), half)
     exponent = math.floor(math.log10(largest)) if not SMALL <= largest < LARGE else 0
     digits = max(0, 1 - math.floor(math.log10(half / 10.0**exponent)))

@@ -12,6 +12,7 @@ from filtercake.crystals.csd import FullAndTruncated, kept_volume
 from filtercake.errors import CrystallizerError
 from filtercake.filtration.resistance import kozeny_carman
 from filtercake.packing.cloud import box_length
+from filtercake.statistics import pooled_spread
 from filtercake.study.config.published import Published
 from filtercake.study.config.study import Study
 from filtercake.study.points import base_rows
@@ -207,9 +208,10 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
     blank where no point of the engine has two packings.
     """
     good = replicates[replicates["status"] == "ok"]
-    spread = good.groupby(["engine", "point"])["porosity_paper_count"].agg(["var", "count"]).dropna()
-    weight = spread["count"] - 1
-    pooled = ((spread["var"] * weight).groupby("engine").sum() / weight.groupby("engine").sum()) ** 0.5
+    pooled = {
+        engine: pooled_spread(values for _, values in rows.groupby("point")["porosity_paper_count"]).sd
+        for engine, rows in good.groupby("engine")
+    }
     rows = []
     for entry in study.published:
         if entry.quantity != "porosity" or entry.cohesion_kJ_m3 is None or entry.friction is None:

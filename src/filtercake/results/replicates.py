@@ -14,8 +14,8 @@ from filtercake.errors import PackingRejected
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.porosity import measure
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing, read_record
+from filtercake.statistics import half_width
 from filtercake.study.points import POINT_COLUMNS, Point
 from filtercake.units import MICROMETRE
 

@@ -7,9 +7,8 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.packing.pack import MANIFEST
+from filtercake.results.tables import read_table
 from filtercake.run.job import failure_reason
 from filtercake.study.points import Point
 
@@ -92,7 +91,7 @@ def _wide_intervals(summary: Path) -> Iterator[str]:
     """Points whose porosity interval is wider than its target, in words."""
     if not summary.exists():
         return
-    table = pd.read_csv(summary)
+    table = read_table(summary)
     for row in table[table["interval_reached"] == "no"].to_dict("records"):
         yield (
             f"{row['point']}: the porosity's interval is {row['porosity_ci95']:.2g} after {row['n']} packings, not "

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.metadata
 import inspect
 import platform
+import re
 import subprocess
 from collections.abc import Iterable
 from functools import cache
@@ -19,6 +19,8 @@ from filtercake.packing.result import sha256
 from filtercake.packing.scene import digest
 
 ROOT = Path(__file__).resolve().parents[1]
+IMPORT = re.compile(r"^ *(?:from (filtercake[\w.]*) import (\([^)]*\)|.*)|import (filtercake\.[\w.]+))", re.MULTILINE)
+"""Statements that import from the package, as ruff formats them."""
 PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "scikit-learn", "jinja2", "pydantic", "snakemake")
 
 
@@ -151,12 +153,10 @@ def _file_of(module: str) -> Path | None:
 
 @cache
 def _imports(path: Path) -> tuple[Path, ...]:
-    """Files below ``ROOT`` that a file imports; parsed once, since most modules stand behind many others."""
+    """Files below ``ROOT`` that a file imports; the text is searched, as parsing it would slow every start."""
     names: list[str] = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    for module, aliases, plain in IMPORT.findall(path.read_text(encoding="utf-8")):
+        aliased = re.findall(r"(\w+)(?: as \w+)?", re.sub("#.*", "", aliases))
+        names += [module or plain, *(f"{module}.{name}" for name in aliased)]
     own = [name.removeprefix("filtercake.") for name in names if name.startswith("filtercake.")]
     return tuple(file for name in own if (file := _file_of(name)) is not None)

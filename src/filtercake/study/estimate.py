@@ -16,6 +16,7 @@ from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.replication import LEAST_REPLICATES
 from filtercake.packing.scene import Scene
+from filtercake.statistics import quantile
 from filtercake.study.points import Point
 from filtercake.units import HOUR, MINUTE, duration
 
@@ -41,8 +42,8 @@ START_SECONDS: Final = 5.0
 SPREAD: Final = 0.0026
 """Standard deviation of one packing's porosity at ``SPREAD_PARTICLES`` spheres."""
 SPREAD_PARTICLES: Final = 2000
-QUANTILE: Final = 2.3
-"""Of Student's t for about nine packings."""
+EXPECTED_FREEDOM: Final = 8
+"""Degrees of freedom of an interval asked for, as it is once reached: about nine packings."""
 
 BASE_MB: Final = 1200
 """Memory of a job before its first sphere: Snakemake on the node (twice 260 MB), Python with numba (330), and room."""
@@ -131,7 +132,7 @@ def packings_of(point: Point) -> int:
     if point.porosity_ci95_target is None:
         return point.replicates
     spread = SPREAD * math.sqrt(SPREAD_PARTICLES / point.scene.particles)
-    needed = math.ceil((QUANTILE * spread / point.porosity_ci95_target) ** 2)
+    needed = math.ceil((quantile(EXPECTED_FREEDOM) * spread / point.porosity_ci95_target) ** 2)
     return min(max(needed, LEAST_REPLICATES, point.replicates), point.most_replicates)
 
 

@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing import contact_law
 from filtercake.packing.engines import kind_of
 from filtercake.packing.scene import Scene
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROSECOND
+from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND
 
 PAGE: Final = "docs/stability.md"
 
@@ -40,6 +41,16 @@ LARGEST_RELATIVE_OVERLAP: Final = 0.035
 """Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
 DOUBTFUL_RELATIVE_OVERLAP: Final = 0.01
 """Contacts overlap by more than this share of the diameter: warned."""
+LIGHTEST_SOLID: Final = 300.0
+"""Density, kg/m3, under that of any solid that is filtered: another unit is meant."""
+SMALLEST_POROSITY, LARGEST_POROSITY = 0.15, 0.85
+"""Porosities beyond which a measured resistance is in another unit than it says, or something of it is."""
+FINEST, COARSEST = 0.5e-6, 20e-3
+"""Largest diameter of a distribution that no filter holds, and one that no filter is for, m: another unit is meant."""
+WIDEST_SPAN: Final = 1e4
+"""Largest diameter over the smallest, beyond which sizes of one distribution are in several units."""
+LIKELY_SIZES: Final = (1e-6, 2e-3)
+"""Largest diameter of most distributions that are filtered, m: what a likelier unit makes of it."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +59,7 @@ class Finding:
 
     Attributes
     ----------
-    key : {"cohesion", "time_step", "density", "restitution"}
+    key : {"cohesion", "time_step", "density", "restitution", "sizes"}
         Which number it is about.
     text : str
         What is wrong, with the number that is allowed and the page that shows why.
@@ -94,6 +105,32 @@ def refusals(scene: Scene) -> Iterator[Finding]:
     if scene.restitution <= engine.least_restitution:
         text = f"{engine.label} takes only more than {engine.least_restitution:g}; use engine: auto ({PAGE})"
         yield Finding("restitution", text)
+
+
+def unit_problems(csd: CrystalSizeDistribution, density: float) -> Iterator[Finding]:
+    """Say which numbers of the crystals must be in another unit than their keys say, and in which.
+
+    Parameters
+    ----------
+    csd : CrystalSizeDistribution
+        A distribution of the crystals.
+    density : float
+        Their density, kg/m3.
+    """
+    if density < LIGHTEST_SOLID:
+        likely = (
+            f": in g/cm3? ({1000.0 * density:g} kg/m3)" if LIGHTEST_SOLID <= 1000.0 * density <= LARGEST_DENSITY else ""
+        )
+        yield Finding("density", f"lighter than any solid (under {LIGHTEST_SOLID:g} kg/m3){likely}")
+    shown = f"{csd.smallest / MICROMETRE:.4g} to {csd.largest / MICROMETRE:.4g} um"
+    if csd.largest > WIDEST_SPAN * csd.smallest:
+        yield Finding("sizes", f"{shown}: the largest crystal is over {WIDEST_SPAN:g} times the smallest; in one unit?")
+    elif not FINEST <= csd.largest <= COARSEST:
+        units = {"mm": 1e3, "m": 1e6, "nm": 1e-3, "cm": 1e4}
+        fits = [u for u, factor in units.items() if LIKELY_SIZES[0] <= factor * csd.largest <= LIKELY_SIZES[1]]
+        likely = f": were they in {' or '.join(fits)}?" if fits else ""
+        why = "no filter holds crystals so fine" if csd.largest < FINEST else "no filter is for crystals so coarse"
+        yield Finding("sizes", f"{shown}: {why}{likely}")
 
 
 def _long_steps(scene: Scene) -> Iterator[Finding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
@@ -12,7 +12,8 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
-from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
+from filtercake.crystals.csd import CrystalSizeDistribution, read_csd, truncate
+from filtercake.crystals.size_laws import made
 from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
 from filtercake.packing.cloud import bed_for
 from filtercake.packing.scene import Scene
@@ -47,6 +48,9 @@ OWN_PREFIXES = ("agreement_", "calibration_")
 """First parts of the names of studies that the workflow makes itself."""
 
 _OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a file of config/benchmarks"])
+
+NAMED_KEYS = ("studies", "calibrations", "results")
+"""Keys of the workflow's configuration that hold names."""
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -111,6 +115,36 @@ def load_workflow(values: Any, file: str) -> Workflow:
         if isinstance(values.get(key), str):  # --config studies=a,b
             values = {**values, key: [name.strip() for name in values[key].split(",") if name.strip()]}
     return parse(Workflow, values, file)
+
+
+def with_names_as_written(config: Mapping[str, Any], files: Iterable[Path], arguments: Iterable[str]) -> dict[str, Any]:
+    """Give back the names that Snakemake has read as numbers: 007 as 7, 2024_05 as 202405, 1e5, nan.
+
+    Parameters
+    ----------
+    config : mapping
+        Snakemake's configuration.
+    files : iterable of Path
+        The files it is from; later ones win.
+    arguments : iterable of str
+        ``key=value``, as ``--config`` has them.
+
+    Raises
+    ------
+    ConfigError
+        If a file is not YAML.
+    """
+    found = dict(config)
+    for file in files:
+        given = read_yaml(file)
+        for key in NAMED_KEYS if isinstance(given, dict) else ():
+            if key in given and given[key] == found.get(key):
+                found[key] = given[key]
+    for argument in arguments:
+        key, _, text = argument.partition("=")
+        if key in NAMED_KEYS and isinstance(found.get(key), int | float):
+            found[key] = text
+    return found
 
 
 def find_studies(workflow: Workflow, folder: Path, file: str) -> list[Path]:
@@ -181,6 +215,7 @@ def check_study(values: Any, path: Path) -> LoadedStudy:
             csds[name] = _load_csd(name, csd, path.parent, model.crystallizer, kinetics)
         except (CsdError, CrystallizerError) as error:
             problems.append(Problem(str(path), *_source_of(name, csd), str(error)))
+    problems += _unit_problems(model, csds, str(path))
     problems += _stability_problems(model, csds, str(path))
     problems += _bed_problems(model, csds, str(path))
     if problems:
@@ -278,6 +313,10 @@ def _source_of(name: str, csd: Csd) -> tuple[str, str]:
         return f"csds.{name}.file", repr(csd.file)
     if csd.residence_time_min is not None:
         return f"csds.{name}.residence_time_min", f"{csd.residence_time_min:g}"
+    law = csd.lognormal or csd.rosin_rammler
+    if law is not None:
+        key = "lognormal" if csd.lognormal else "rosin_rammler"
+        return f"csds.{name}.{key}", ", ".join(f"{part} {value:g}" for part, value in law.model_dump().items())
     return f"csds.{name}.mixture", f"{len(csd.mixture or [])} classes"
 
 
@@ -292,8 +331,7 @@ def _load_csd(
         state = steady_state(kinetics, csd.residence_time_min * MINUTE, crystallizer.slurry_concentration_kg_m3)
         full = crystal_size_distribution(state.size_scale, crystallizer.bin_width_um * MICROMETRE)
     else:
-        classes = csd.mixture or []
-        full = mixture([c.size_um * MICROMETRE for c in classes], [c.volume_fraction for c in classes])
+        full = made(csd.recipe)
     truncated = truncate(full, **csd.truncation).csd
     return LoadedCsd(full, truncated, csd.label or name, file, state)
 
@@ -364,6 +402,19 @@ def _values(model: Study, index: int, name: str) -> list[tuple[str, float]]:
     if given is None:
         return [(f"material.{name}", getattr(model.material, name))]
     return [(f"sweeps[{index}].{name}[{j}]", value) for j, value in enumerate(given)]
+
+
+def _unit_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterable[Problem]:
+    """Densities and sizes that must be in another unit, one problem per key."""
+    found: dict[str, Problem] = {}
+    for name, csd in () if model.material.trust_units else csds.items():
+        for finding in limits.unit_problems(csd.full, model.material.density):
+            key, value = ("material.density_kg_m3", f"{model.material.density:g}")
+            if finding.key == "sizes":
+                key, value = _source_of(name, model.csds[name])
+            text = f"{finding.text}; if the unit is right, set material.trust_units: true"
+            found.setdefault(key, Problem(file, key, value, text))
+    return found.values()
 
 
 def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> list[Problem]:

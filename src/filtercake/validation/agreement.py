@@ -5,14 +5,14 @@ Packings are chaotic: the same cloud settles to another bed with another roundin
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 
-from filtercake.packing.replication import half_width
+from filtercake.statistics import difference_half_width, half_width, standard_error
 from filtercake.study.config.sweep import SWEPT
 
-STANDARD_ERRORS = 2.0
-"""Combined standard errors within which two means agree."""
 LARGEST_STANDARD_ERROR = 0.001
 """Combined standard error of the porosity up to which a comparison says anything."""
 
@@ -31,14 +31,15 @@ def compare_engines(replicates: pd.DataFrame, reference: str, other: str) -> pd.
     -------
     DataFrame
         One row per case: n, mean and standard error of each engine, their difference (other minus reference), its
-        standard error, the number of failed packings, and two verdicts: ``sharp`` (the standard error is small
-        enough to say anything) and ``agree`` (sharp, and the difference is within two of them).
+        standard error and half-width of its 95 % interval (Welch), the number of failed packings, and two verdicts:
+        ``sharp`` (the standard error is small enough to say anything) and ``agree`` (sharp, and the interval holds 0).
     """
     rows = []
     for case, group in replicates.groupby(["csd", *SWEPT], sort=False):
         good = group[group["status"] == "ok"]
         ours, theirs = (good.loc[good["engine"] == engine, "porosity"] for engine in (other, reference))
-        error = float(np.hypot(_standard_error(ours), _standard_error(theirs)))
+        errors = standard_error(theirs), standard_error(ours)
+        error, half = math.hypot(*errors), difference_half_width(ours, theirs)
         difference = float(ours.mean() - theirs.mean())
         sharp = error <= LARGEST_STANDARD_ERROR
         rows.append(
@@ -47,15 +48,16 @@ def compare_engines(replicates: pd.DataFrame, reference: str, other: str) -> pd.
                 "particles": int(good["particles"].max()) if len(good) else 0,
                 f"n_{reference}": len(theirs),
                 f"porosity_{reference}": theirs.mean(),
-                f"se_{reference}": _standard_error(theirs),
+                f"se_{reference}": errors[0],
                 f"n_{other}": len(ours),
                 f"porosity_{other}": ours.mean(),
-                f"se_{other}": _standard_error(ours),
+                f"se_{other}": errors[1],
                 "difference": difference,
                 "difference_se": error,
+                "difference_ci95": half,
                 "n_failed": len(group) - len(good),
                 "sharp": sharp,
-                "agree": sharp and abs(difference) <= STANDARD_ERRORS * error,
+                "agree": sharp and abs(difference) <= half,
             }
         )
     return pd.DataFrame(rows)
@@ -100,8 +102,3 @@ def compare_sizes(small: pd.DataFrame, large: pd.DataFrame) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(rows)
-
-
-def _standard_error(values: pd.Series[float]) -> float:
-    """Return the standard error of a mean; nan for fewer than two values."""
-    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution, truncate
+from filtercake.packing.analytic_models import PEERS
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
@@ -23,9 +24,16 @@ from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
 from filtercake.packing.pack import Report
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.scene import Scene
+from filtercake.statistics import (
+    difference_half_width,
+    effective_freedom,
+    paired_half_width,
+    pooled_spread,
+    quantile,
+    standard_error,
+)
 from filtercake.study import limits
-from filtercake.units import GRAVITY, MEGAPASCAL, MICROMETRE, MICROSECOND
-from filtercake.validation.analytic_models import PEERS
+from filtercake.units import GRAVITY, MEGAPASCAL, MICROMETRE, MICROSECOND, FloatArray
 from filtercake.validation.timing import Contender, contender, settle_timed, warm_up
 
 ESTIMATORS = {
@@ -57,6 +65,7 @@ COLUMNS = (
     "sd",
     "bias",
     "bias_se",
+    "bias_ci95",
     "error",
     "resistance_error",
 )
@@ -111,10 +120,13 @@ class Reference:
     ----------
     porosity, standard_error : float
         Mean of the reference ensemble's interior porosity, and its standard error.
+    freedom : float
+        Degrees of freedom of the latter; infinite where it is known.
     """
 
     porosity: float
     standard_error: float
+    freedom: float = math.inf
 
 
 def variants(case: str, base: Scene, full: CrystalSizeDistribution, quick: bool = False) -> list[Variant]:
@@ -288,8 +300,9 @@ def errors(case: str, timings: pd.DataFrame, reference: Reference) -> pd.DataFra
     -------
     DataFrame
         One row per variant and estimator, ``COLUMNS``: seconds (median of one packing), porosity (mean), sd (of one
-        packing), bias and its standard error, error (root mean square of bias and sd), resistance_error (root mean
-        square relative error of a Kozeny-Carman resistance).
+        packing), bias, its standard error and the half-width of its 95 % interval (Welch), error (root mean square of
+        bias and sd), resistance_error (root mean square relative error of a Kozeny-Carman resistance). What needs the
+        spread is nan for a single packing.
     """
     rows = []
     for key, group in timings.groupby(list(VARIANT_COLUMNS[1:]), sort=False):
@@ -308,27 +321,29 @@ def errors(case: str, timings: pd.DataFrame, reference: Reference) -> pd.DataFra
                     "n": values.size,
                     "n_failed": len(group) - len(good),
                     "seconds": float(group["wall_s"].median()),
-                    **_error(values, reference),
+                    # a model's value has no spread
+                    **_error(np.repeat(values, 2) if key[0] == ANALYTIC else values, reference),
                 }
             )
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _error(values: np.ndarray[Any, np.dtype[np.float64]], reference: Reference) -> dict[str, float]:
+def _error(values: FloatArray, reference: Reference) -> dict[str, float]:
     if not values.size:
-        return dict.fromkeys(("porosity", "sd", "bias", "bias_se", "error", "resistance_error"), math.nan)
-    spread = float(values.std(ddof=1)) if values.size > 1 else 0.0
-    own = spread / math.sqrt(values.size)
+        return dict.fromkeys(COLUMNS[-7:], math.nan)
+    spread, own = pooled_spread([values]), standard_error(values)
+    freedom = effective_freedom([own**2, reference.standard_error**2], [spread.freedom, reference.freedom])
+    bias_se = math.hypot(own, reference.standard_error)
     bias = float(values.mean()) - reference.porosity
-    # the noise of the mean is no bias
-    squared = max(bias**2 - own**2 - reference.standard_error**2, 0.0)
+    squared = bias**2 - bias_se**2  # the noise of the mean is no bias
     resistance = np.array([_flow_factor(value) for value in values]) / _flow_factor(reference.porosity) - 1.0
     return {
         "porosity": float(values.mean()),
-        "sd": spread,
+        "sd": spread.sd,
         "bias": bias,
-        "bias_se": math.hypot(own, reference.standard_error),
-        "error": math.sqrt(squared + spread**2),
+        "bias_se": bias_se,
+        "bias_ci95": quantile(freedom) * bias_se,
+        "error": math.sqrt((0.0 if squared < 0.0 else squared) + spread.sd**2),
         "resistance_error": float(np.sqrt(np.mean(resistance**2))),
     }
 
@@ -359,7 +374,7 @@ def reference_of(table: pd.DataFrame, study: str, friction: float) -> Reference:
     values = table.loc[here, "porosity"].to_numpy(np.float64)
     if values.size < 2:
         raise ValueError(f"the reference holds no ensemble of {study} at friction {friction:g}")
-    return Reference(float(values.mean()), float(values.std(ddof=1) / math.sqrt(values.size)))
+    return Reference(float(values.mean()), standard_error(values), values.size - 1.0)
 
 
 def coverage(
@@ -500,20 +515,22 @@ def choice_table(
     rows = []
     for k, item in enumerate(listed):
         mine = good[(good["axis"] == item.choice) & (good["value"] == float(k))]["porosity"].to_numpy(np.float64)
-        rows.append({"choice": item.choice, "model": item.base, "other": item.other, **_change(own, mine)})
+        rows.append(
+            {
+                "choice": item.choice,
+                "model": item.base,
+                "other": item.other,
+                **_change(own, mine, difference_half_width),
+            }
+        )
     for column, name in list(ESTIMATORS.items())[1:]:
-        paired = default[column].to_numpy(np.float64) - own
-        half = 1.96 * float(paired.std(ddof=1)) / math.sqrt(paired.size)
-        mean = float(own.mean())
-        factor = _flow_factor(mean + float(paired.mean())) / _flow_factor(mean) - 1.0
+        counted = default[column].to_numpy(np.float64)  # of the same packings
         rows.append(
             {
                 "choice": "floor layer" if column == "porosity_from_floor" else "whole spheres by centre",
                 "model": "interior slab",
                 "other": name,
-                "porosity_change": float(paired.mean()),
-                "porosity_change_ci95": half,
-                "resistance_change": factor,
+                **_change(own, counted, paired_half_width),
             }
         )
     rows.append(
@@ -530,12 +547,11 @@ def choice_table(
 
 
 def _change(
-    own: np.ndarray[Any, np.dtype[np.float64]], other: np.ndarray[Any, np.dtype[np.float64]]
+    own: FloatArray, other: FloatArray, half_width: Callable[[FloatArray, FloatArray], float]
 ) -> dict[str, float]:
-    error = math.hypot(*(float(values.std(ddof=1)) / math.sqrt(values.size) for values in (own, other)))
     mean, changed = float(own.mean()), float(other.mean())
     return {
         "porosity_change": changed - mean,
-        "porosity_change_ci95": 1.96 * error,
+        "porosity_change_ci95": half_width(own, other),
         "resistance_change": _flow_factor(changed) / _flow_factor(mean) - 1.0,
     }

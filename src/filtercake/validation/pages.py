@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.study import limits
 from filtercake.user_files import templates
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
-from filtercake.validation.stability import COVERAGE, OUTCOMES, families, undetected, wrong
+from filtercake.validation.stability import OUTCOMES, UNDECIDED, families, undetected, wrong
 
 INTERIOR, COUNT = "interior slab", "count"
 PAPER = "as published"
 OK = OUTCOMES[0]
+GOOD = (OK, UNDECIDED)
+"""Outcomes of a case in which nothing went wrong as far as its packings can tell."""
 FAILING = ("inaccurate", "unsettled", "exploded", "refused")
 """Outcomes of a case beyond a limit."""
 
@@ -109,7 +113,7 @@ def said(errors: pd.DataFrame) -> dict[str, Any]:
     return {
         "variants": len(packed),
         "front": int(packed["on_front"].sum()),
-        "biased": _records(packed[packed["bias"].abs() > COVERAGE * packed["bias_se"]]),
+        "biased": _records(packed[packed["bias"].abs() > packed["bias_ci95"]]),
         "failed": _records(packed[packed["n_failed"] > 0]),
         "analytic": _records(interior[analytic]),
     }
@@ -125,17 +129,17 @@ def stability(template: Path, table: pd.DataFrame) -> str:
             for (engine, fence), group in table.groupby(["engine", "fence"])
         ],
         maps=[
-            {"family": family, "engine": engine, "ok": int((rows["outcome"] == OK).sum()), "n": len(rows)}
+            {"family": family, "engine": engine, "good": int(rows["outcome"].isin(GOOD).sum()), "n": len(rows)}
             | {"x_name": rows["x_name"].iloc[0], "y_name": rows["y_name"].iloc[0], "failing": failing(rows)}
             for (family, engine), rows in table.groupby(["family", "engine"], sort=False)
         ],
-        limits=vars(limits),
+        limits={**vars(limits), "LIGGGHTS_RESTITUTION": Liggghts.least_restitution},
         total=len(table),
         absent=[name for name in families() if name not in set(table["family"])],
         wrong=_records(table[wrong(table)]),
         undetected=_records(undetected(table)),
         drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),
-        gain=float(table.loc[(table["outcome"] == OK) & (table["fence"] == "allowed"), "energy_gain"].max()),
+        gain=float(table.loc[table["outcome"].isin(GOOD) & (table["fence"] == "allowed"), "energy_gain"].max()),
     )
 
 
@@ -203,7 +207,14 @@ def _words(rows: pd.DataFrame) -> str:
 
 
 def _render(template: Path, **values: Any) -> str:
-    return templates(template.parent).get_template(template.name).render(**values)
+    environment = templates(template.parent)
+    environment.filters["number"] = _number
+    return environment.get_template(template.name).render(**values)
+
+
+def _number(value: float, form: str) -> str:
+    """Write a number by a format of printf's; a dash where there is none, as of the spread of one packing."""
+    return form % value if math.isfinite(value) else "–"
 
 
 def _records(table: pd.DataFrame) -> list[dict[str, Any]]:

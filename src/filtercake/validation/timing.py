@@ -20,9 +20,9 @@ from filtercake.packing.accept import accept
 from filtercake.packing.engines import Engine, get_engine
 from filtercake.packing.pack import Report, settle
 from filtercake.packing.porosity import measure
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
+from filtercake.statistics import difference_half_width, half_width
 
 WARM_UP_PARTICLES = 60
 """Spheres packed before the clock starts: the embedded engine's kernels are compiled once per machine."""
@@ -156,7 +156,7 @@ def compare(timings: pd.DataFrame) -> pd.DataFrame:
     for engine, group in timings.groupby("engine", sort=False):
         values, reference = group["porosity"].to_numpy(np.float64), base["porosity"].to_numpy(np.float64)
         difference = float(values.mean() - reference.mean())
-        interval = float(np.hypot(half_width(values), half_width(reference)))
+        interval = difference_half_width(values, reference)
         rows.append(
             {
                 "engine": engine,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -11,11 +12,38 @@ import pandas as pd
 from filtercake.calibration.fit import Observation, Parameter, Response, calibrate
 from filtercake.units import FloatArray
 
-COLUMNS = ("friction", "truth_kJ_m3", "repeat", "value_kJ_m3", "low_kJ_m3", "high_kJ_m3", "covered", "relative_error")
+CASE = ("friction", "truth_kJ_m3", "distributions", "discrepancy")
+COLUMNS = (*CASE, "repeat", "value_kJ_m3", "low_kJ_m3", "high_kJ_m3", "covered", "relative_error")
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """How the cakes are measured.
+
+    Attributes
+    ----------
+    tests : int
+        Measurements of every distribution.
+    noise : float
+        Relative standard deviation of a measurement, which the calibration is told.
+    distributions : int
+        How many are measured, other ones in turn; 0 for all.
+    discrepancy : float
+        Relative standard deviation, between distributions, of what no packing explains, which it is not told.
+    shares : int
+        Calibrations that share out a point's packings, the next ones taking them again; 0 for all, so that each has its
+        own. Beside a discrepancy, packings hardly count.
+    """
+
+    tests: int
+    noise: float
+    distributions: int = 0
+    discrepancy: float = 0.0
+    shares: int = 0
 
 
 def repeat_calibrations(
-    pool: pd.DataFrame, truth: pd.DataFrame, repeats: int, tests: int, noise: float, seed: int = 0
+    pool: pd.DataFrame, truth: pd.DataFrame, repeats: int, asked: Experiment, seed: int = 0
 ) -> pd.DataFrame:
     """Calibrate again and again, each time with packings of its own and measurements with noise of their own.
 
@@ -26,10 +54,12 @@ def repeat_calibrations(
         point's replicates.
     truth : DataFrame
         Packings, from other seeds, at the one cohesion to be found; their mean resistance is what is measured.
-    repeats, tests : int
-        Number of calibrations, and of measurements of every distribution.
-    noise, seed : float, int
-        Relative standard deviation of a measurement, which the calibration is told, and the seed of the noise.
+    repeats : int
+        Number of calibrations.
+    asked : Experiment
+        How they are measured.
+    seed : int
+        Of the noise and the discrepancy.
 
     Returns
     -------
@@ -48,29 +78,32 @@ def repeat_calibrations(
     values = np.sort(good["cohesion_kJ_m3"].unique())
     parameter = Parameter("cohesion_kJ_m3", float(values[0]), float(values[-1]))
     rows = []
+    every = sorted(str(name) for name in good["csd"].unique())
+    count = asked.distributions or len(every)
+    case = (friction, cohesion, count, asked.discrepancy)
     for repeat in range(repeats):
-        random = np.random.default_rng([seed, repeat])
+        names = np.roll(every, repeat)[:count]
         responses = {
-            str(csd): Response((parameter,), values[:, None], _shares(rows_of, values, repeat, repeats))
-            for csd, rows_of in good.groupby("csd")
+            str(csd): Response((parameter,), values[:, None], _shares(rows_of, values, repeat, asked.shares or repeats))
+            for csd, rows_of in good[good["csd"].isin(names)].groupby("csd")
         }
-        observations = _measure(real, tests, noise, random)
+        observations = _measure(real[real["csd"].isin(names)], asked, [seed, repeat])
         (found,) = calibrate(observations, responses).estimates
         covered = found.low <= cohesion <= found.high
         error = abs(found.value - cohesion) / cohesion
-        rows.append((friction, cohesion, repeat, found.value, found.low, found.high, covered, error))
+        rows.append((*case, repeat, found.value, found.low, found.high, covered, error))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 def summarise(table: pd.DataFrame) -> pd.DataFrame:
-    """Count, per truth, how often the interval covered it, and the median error and half-width, both relative."""
+    """Count, case by case, how often the interval covered the truth; the median error and half-width are relative."""
     rows = []
-    for _, group in table.groupby(["friction", "truth_kJ_m3"]):
-        friction, truth = (float(group[name].iloc[0]) for name in ("friction", "truth_kJ_m3"))
+    for case, group in table.groupby(list(CASE)):
+        truth = float(group["truth_kJ_m3"].iloc[0])
         half = 0.5 * (group["high_kJ_m3"] - group["low_kJ_m3"]) / truth
         covered, error = int(group["covered"].sum()), float(group["relative_error"].median())
-        rows.append((friction, truth, len(group), covered, error, float(half.median())))
-    names = ["friction", "truth_kJ_m3", "repeats", "covered", "median_relative_error", "median_relative_half_width"]
+        rows.append((*case, len(group), covered, error, float(half.median())))
+    names = [*CASE, "repeats", "covered", "median_relative_error", "median_relative_half_width"]
     return pd.DataFrame(rows, columns=names)
 
 
@@ -81,21 +114,24 @@ def _only(table: pd.DataFrame, name: str) -> float:
     return float(found[0])
 
 
-def _shares(rows: pd.DataFrame, values: FloatArray, repeat: int, repeats: int) -> list[FloatArray]:
+def _shares(rows: pd.DataFrame, values: FloatArray, repeat: int, shares: int) -> list[FloatArray]:
     """ln(alpha) of a repeat's own replicates at every cohesion."""
-    shares = []
+    found = []
     for value in values:
         own = rows.loc[np.isclose(rows["cohesion_kJ_m3"], value)].sort_values("replicate")
-        share = own.loc[own["replicate"] % repeats == repeat, "resistance_m_kg"].to_numpy(np.float64)
+        share = own.loc[own["replicate"] % shares == repeat % shares, "resistance_m_kg"].to_numpy(np.float64)
         if share.size < 2:
             raise ValueError(f"{value:g} kJ/m3 has {share.size} packings for repeat {repeat}: at least 2 are needed")
-        shares.append(np.log(share))
-    return shares
+        found.append(np.log(share))
+    return found
 
 
-def _measure(real: pd.DataFrame, tests: int, noise: float, random: np.random.Generator) -> Sequence[Observation]:
-    return [
-        Observation(f"{csd} {k}", str(csd), math.log(float(rows.mean())) + noise * random.standard_normal(), noise)
-        for csd, rows in real.groupby("csd")["resistance_m_kg"]
-        for k in range(tests)
-    ]
+def _measure(real: pd.DataFrame, asked: Experiment, seed: Sequence[int]) -> list[Observation]:
+    noise, apart = (np.random.default_rng([*seed, *more]) for more in ((), (1,)))
+    found = []
+    for csd, rows in real.groupby("csd")["resistance_m_kg"]:
+        true = math.log(float(rows.mean())) + asked.discrepancy * apart.standard_normal()
+        for k in range(asked.tests):
+            value = true + asked.noise * noise.standard_normal()
+            found.append(Observation(f"{csd} {k}", str(csd), value, asked.noise))
+    return found

@@ -13,6 +13,9 @@ from filtercake.calibration.fit import (
     Observation,
     Parameter,
     Response,
+    _Groups,
+    _scale,
+    _variances,
     advised_friction,
     calibrate,
     compare_friction,
@@ -100,7 +103,11 @@ class TestFit:
         mean = np.average([0.02, -0.01, -0.03], weights=weights)
         (estimate,) = found.estimates
         assert estimate.value == pytest.approx(50.0 + mean / slope, abs=0.05)
-        assert estimate.half_width == pytest.approx(1.96 / math.sqrt(weights.sum()) / abs(slope), rel=0.02)
+        # Student's, by how far the two distributions are apart
+        squares = (0.02 + 0.014) ** 2 / (0.05**2 + 1.0 / weights[1:].sum())
+        assert found.chi_square == pytest.approx(squares, rel=0.02)
+        reach = math.sqrt(squares) * 12.706 / math.sqrt(weights.sum())
+        assert estimate.half_width == pytest.approx(reach / abs(slope), rel=0.02)
         assert found.model_share < 1e-3 and not found.findings
 
     def test_noise_of_the_packings_widens_the_interval(self) -> None:
@@ -136,6 +143,12 @@ class TestFit:
         assert not kinds(found) & {"confounded", "flat"}
         alone = calibrate(observations[:1], responses)
         assert {"confounded", "flat"} <= kinds(alone)
+
+    def test_few_replicates_are_drawn_towards_the_spread_of_all(self) -> None:
+        samples = [np.array([-0.01, 0.01]), np.array([-0.03, 0.0, 0.03])]
+        own, freedom = np.array([2e-4, 18e-4]), np.array([1.0, 2.0])
+        pooled = 20e-4 / 3.0
+        assert _variances(samples) == pytest.approx((8.0 * pooled + own) / (8.0 + freedom))
 
     def test_errors(self) -> None:
         with pytest.raises(CalibrationError, match="no measurement"):
@@ -187,6 +200,30 @@ class TestFindings:
         )
         assert consistent.discrepancy == 0.0
         assert found.estimates[0].half_width > 3.0 * consistent.estimates[0].half_width
+
+    @pytest.mark.parametrize(("count", "limit"), [(2, 161.4), (3, 18.51)])
+    def test_an_estimated_discrepancy_is_held_against_f(self, count: int, limit: float) -> None:
+        """Straight responses, known exactly: the interval is Student's, of the distributions alone."""
+        values = np.linspace(-900.0, 1000.0, 21)
+        wide = Parameter("cohesion_kJ_m3", -900.0, 1000.0)
+        lines = [22.0 - 0.01 * value + 1e-4 * np.array([-1.0, 1.0]) for value in values]
+        shifts = [0.2, -0.1, -0.2][:count]
+        responses = {f"{k}": Response((wide,), values[:, None], lines) for k in range(count)}
+        found = calibrate([Observation(f"{k}", f"{k}", 21.5 + s, 0.01) for k, s in enumerate(shifts)], responses)
+        assert found.discrepancy > 0.0
+        assert found.threshold == pytest.approx(limit, rel=1e-3)
+        error = np.std(shifts, ddof=1) / math.sqrt(count) / 0.01
+        assert found.estimates[0].half_width == pytest.approx(math.sqrt(limit) * error, rel=0.02)
+
+    def test_distributions_that_agree_may_do_so_by_chance(self) -> None:
+        """Their spread is in the interval though it is no discrepancy, but never makes it narrower than the errors."""
+        fits = [fitted(seed) for seed in range(12)]
+        for found in fits:
+            expected = max(3.8415, 18.513 * min(found.chi_square / 2.0, 1.0))
+            assert found.threshold == pytest.approx(expected, rel=1e-3)
+        assert {found.threshold > 3.85 for found in fits if found.discrepancy == 0.0} == {True, False}
+        one = calibrate(measured(1, 45.0, {"one": 0.0}), {"one": response(3)})
+        assert one.threshold == pytest.approx(3.8415, abs=1e-4)  # nothing but its own errors to go by
 
     def test_a_measurement_out_of_reach_is_said(self) -> None:
         found = calibrate([Observation("a", "one", float(law(0.0)) + 0.25, 0.05)], {"one": response(1)})
@@ -274,6 +311,17 @@ class TestContradictions:
         (estimate,) = found.estimates
         assert estimate.low < 35.0 and estimate.high > 75.0
 
+    def test_their_scatter_is_held_against_f(self) -> None:
+        """Two measurements know their scatter from one degree of freedom, three from two."""
+        assert self.fit(30.0, 80.0).threshold == pytest.approx(161.4, rel=1e-3)
+        assert self.fit(30.0, 80.0, 60.0).threshold == pytest.approx(18.51, rel=1e-3)
+        assert self.fit(50.0, 51.0).threshold == pytest.approx(3.8415, abs=1e-4)
+        # beside a sharp one of another cake, the doubtful two count for little
+        groups = _Groups(("doubtful", "sharp"), np.array([0.1, 0.01]) ** 2, np.array([1.0, math.inf]), np.zeros((2, 1)))
+        assert _scale(groups, 0.0, 1) == (1.0, pytest.approx((1.0 + 100.0) ** 2))
+        assert _scale(groups, 0.5, 1) == (0.5, 1.0)
+        assert _scale(groups, 9.0, 1) == (1.0, 1.0)
+
     def test_within_the_errors_are_none(self) -> None:
         assert "contradiction" not in kinds(self.fit(50.0, 51.0))
         # 0.0175 per kJ/m3 at most: five apart is nothing at 5 %
@@ -315,8 +363,19 @@ class TestUse:
         widths = [math.log(found.high / found.low) for found in (predict(sharp, new), predict(vague, new))]
         assert widths[1] > 2.0 * widths[0]
 
+    @pytest.mark.parametrize(("freedom", "student"), [(2.0, 4.3027), (5.0, 2.5706), (math.inf, 1.95996)])
+    def test_prediction_is_students_where_the_errors_were_estimated(self, freedom: float, student: float) -> None:
+        line = Response((COHESION,), VALUES[:, None], [22.0 - 0.01 * s + 1e-5 * np.array([-1.0, 1.0]) for s in VALUES])
+        found = fitted(1)
+        for spread, discrepancy, expected in ((1.5, 0.0, 0.015), (0.5, 0.1, 0.1), (1.5, 0.02, 0.025)):
+            deviance = ((found.axes[0] - 50.0) / spread) ** 2
+            known = replace(found, deviance=deviance, discrepancy=discrepancy, scale=1.0, scale_freedom=freedom)
+            made = predict(known, line)
+            reach = 0.5 * math.log(made.high / made.low)
+            assert reach == pytest.approx(student * expected, rel=0.06)
+
     def test_prediction_holds_the_discrepancy(self) -> None:
-        found, new = fitted(2), response(77, 0.7)
+        found, new = replace(fitted(1), scale=1.0, scale_freedom=math.inf), response(77, 0.7)
         plain, doubted = predict(found, new), predict(replace(found, discrepancy=0.25), new)
         reach = math.log(doubted.high / doubted.low)
         assert reach == pytest.approx(math.hypot(math.log(plain.high / plain.low), 2.0 * 1.96 * 0.25), rel=0.03)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -109,8 +110,8 @@ class TestRounds:
 
     def test_refines_near_the_optimum_and_ends(self) -> None:
         sharp = [Observation(o.name, o.csd, o.ln_resistance, 0.005) for o in OBSERVATIONS]
-        rounds, _ = run_rounds(settings(relative_ci95_target=0.05, rounds=9), sharp)
-        assert rounds[-1].finished and not rounds[-1].points and "within 5 %" in rounds[-1].why
+        rounds, _ = run_rounds(settings(relative_ci95_target=0.1, rounds=9), sharp)
+        assert rounds[-1].finished and not rounds[-1].points and "within 10 %" in rounds[-1].why
         assert len(rounds) > 2
         later = [name for made in rounds[1:] for name in made.points]
         assert later and all(15.0 <= float(name.split("_s")[1].split("_")[0]) <= 60.0 for name in later)
@@ -145,7 +146,7 @@ class TestOutcome:
         outcome, _ = self.outcome()
         record = study.summary(outcome, settings(), "because")
         found = record["parameters"]["cohesion_kJ_m3"]
-        assert found["low"] < TRUTH < found["high"] and found["high"] - found["low"] < 12.0
+        assert found["low"] < TRUTH < found["high"] and found["high"] - found["low"] < 25.0
         assert record["friction"] == 0.0 and record["ended"] == "because" and record["findings"] == []
         assert set(outcome.left_out) == {"fine", "coarse"} and max(map(abs, outcome.left_out.values())) < 0.1
 
@@ -233,6 +234,29 @@ class TestOutcome:
         outcome, table = self.outcome()
         assert not any(finding.kind == "soft" for finding in outcome.findings)
         assert any(f.kind == "soft" for f in conclude(settings(soft_above=20.0), OBSERVATIONS, table).findings)
+
+    def test_points_that_failed_are_the_reason_of_what_is_not_known(self) -> None:
+        """Nothing was packed under 40 kJ/m3: it is not the measurements that do not tell the cohesion from zero."""
+        _, table = self.outcome()
+        lost = table["cohesion_kJ_m3"] < 40.0
+        table.loc[lost, "status"], table.loc[lost, "ln_resistance"] = "failed", math.nan
+        vague = [dataclasses.replace(item, standard_error=0.5) for item in OBSERVATIONS]
+        outcome = conclude(settings(), vague, table)
+        assert {"zero", "several", "flat"} & {finding.kind for finding in outcome.fit.findings}
+        kinds = [finding.kind for finding in outcome.findings]
+        assert "failed" in kinds and not {"zero", "several", "flat"} & set(kinds)
+        (text,) = (finding.text for finding in outcome.findings if finding.kind == "failed")
+        values = sorted({float(s) for s in table.loc[lost, "cohesion_kJ_m3"]})
+        assert f"coarse at {', '.join(f'{s:g}' for s in values)} kJ/m3, fine at " in text
+        assert "below 40 kJ/m3 the interval is the smooth model's guess, not what the measurements say" in text
+
+    def test_a_failed_point_beyond_the_interval_is_named_without_blame(self) -> None:
+        outcome, table = self.outcome()
+        assert not any(finding.kind == "failed" for finding in outcome.findings)
+        far = (table["csd"] == "fine") & (table["cohesion_kJ_m3"] == 100.0)
+        table.loc[far, "status"], table.loc[far, "ln_resistance"] = "failed", math.nan
+        found = {finding.kind: finding.text for finding in conclude(settings(), OBSERVATIONS, table).findings}
+        assert found["failed"] == "no packing was accepted of fine at 100 kJ/m3 (column reason of replicates.csv)"
 
     def test_friction_can_be_fitted(self) -> None:
         chosen = settings(

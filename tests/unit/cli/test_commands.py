@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 import shutil
 from collections.abc import Iterator
 from itertools import chain
@@ -29,7 +30,7 @@ DRUM = [
     *["--slurry-concentration-kg-m3", "200", "--pressure-drop-kPa", "53.33", "--submerged-fraction", "0.3"],
     *["--rotation-rate-rpm", "0.2", "--medium-resistance-1-m", "5e9"],
 ]
-COMMANDS = ["csd", "pack", "porosity", "resistance", "filter-area"]
+COMMANDS = ["csd", "pack", "porosity", "resistance", "filter-area", "test"]
 ALL_COMMANDS = [*COMMANDS, "export", "rerun"]
 BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
 
@@ -72,6 +73,28 @@ def test_csd_of_the_papers_crystallizer(capsys: Capture, tmp_path: Path) -> None
     assert again["sum_x_over_d2_1_m2"] == pytest.approx(found["sum_x_over_d2_1_m2"], rel=0.01)
 
 
+def test_a_law_of_few_numbers(capsys: Capture) -> None:
+    beads = as_json(["csd", "--lognormal", "53.5,74.796,104.309"], capsys)
+    assert beads["sauter_mean_um"] == pytest.approx(72.289, rel=2e-3)  # the instrument's own
+    assert 0.99 < beads["kept_volume_fraction"] < 1.0  # without its tails
+    milled = as_json(["csd", "--rosin-rammler", "60,3", "--truncate-below-volume-fraction", "0"], capsys)
+    assert milled["sum_x_over_d_1_m"] == pytest.approx(math.gamma(2 / 3) / 60e-6, rel=1e-12)
+    assert milled["kept_volume_fraction"] == pytest.approx(1.0)
+    assert main(["resistance", "--porosity", "0.4", "--density-kg-m3", "1180", "--rosin-rammler", "60,3"]) == 0
+    assert "distribution: Rosin-Rammler by volume: d' 60 um" in capsys.readouterr().err
+
+
+def test_how_a_file_was_read_is_said(capsys: Capture, tmp_path: Path) -> None:
+    file = tmp_path / "x.csv"
+    file.write_text("size_um;volume_percent\n20-30;40\n30-50;60\n")
+    said = "class edges, geometric middles; % by volume; semicolons; 2 classes"
+    assert as_json(["csd", str(file)], capsys)["understood"] == said
+    assert main(["csd", str(file)]) == 0
+    assert capsys.readouterr().out.startswith(f"{file}: {said}\n")
+    assert main(["resistance", "--porosity", "0.4", "--density-kg-m3", "1180", str(file)]) == 0
+    assert capsys.readouterr().err == f"{file}: {said}\n"
+
+
 def test_csd_in_words(capsys: Capture) -> None:
     assert main(["csd", *PMMA]) == 0
     printed = capsys.readouterr().out
@@ -103,10 +126,14 @@ def test_filter_area_and_its_inverse(capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["csd"], "one of FILE, --mixture and --kinetics"),
-        (["csd", "a.csv", *PMMA], "one of FILE, --mixture and --kinetics"),
+        (["csd"], "one of FILE, --mixture, --lognormal, --rosin-rammler and --kinetics"),
+        (["csd", "a.csv", *PMMA], "one of FILE, --mixture, --lognormal, --rosin-rammler and --kinetics"),
         (["csd", "no/such.csv"], "no/such.csv: cannot be read"),
         (["csd", "--mixture", "20"], "--mixture = 20: must be sizes"),
+        (["csd", "--lognormal", "20,80"], "--lognormal = ['20', '80']: must be 3 numbers: d10_um, d50_um, d90_um"),
+        (["csd", "--lognormal", "20,40,100"], "are not of a lognormal distribution: d50 is -11% off"),
+        (["csd", "--rosin-rammler", "60,1.5"], "exponent = 1.5: must be above 2"),
+        (["csd", "--rosin-rammler", "60,x"], "--rosin-rammler = x: must be a number"),
         (["csd", "--mixture", "20:0.5,50:0.2"], "sum to 0.7"),
         (["csd", "--mixture", "nan:1"], "--mixture = nan: must be"),
         (["csd", "--mixture", "1e-300:1"], "--mixture = 1e-300: must be greater than or equal to 0.001"),
@@ -158,6 +185,12 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("packed") / "bed"
     assert main(["pack", *BED, "--replicates", "2", "--output", str(folder)]) == 0
     return folder
+
+
+def test_one_packing_has_a_dash_for_an_interval(tmp_path: Path, capsys: Capture) -> None:
+    assert main(["pack", *BED, "--replicates", "1", "--output", str(tmp_path / "bed")]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("+- -") == 2 and "nan" not in printed
 
 
 def test_pack_prints_what_porosity_and_resistance_find_in_its_files(packed: Path, capsys: Capture) -> None:
@@ -384,3 +417,47 @@ def test_no_filter_makes_it_fall_over(values: list[float], inverse: bool) -> Non
 def test_no_crystallizer_makes_it_fall_over(width: float, time: float, slurry: float) -> None:
     values = [f"--bin-width-um={width!r}", f"--residence-time-min={time!r}", f"--slurry-concentration-kg-m3={slurry!r}"]
     assert main(["csd", "--json", "--kinetics", "potassium_nitrate", *values]) in (0, 2)
+
+
+LEAF_TESTS = Path(__file__).resolve().parents[2] / "data" / "leaf_tests"
+CONDITIONS = [
+    *["--area-cm2", "50", "--pressure-drop-kPa", "70", "--viscosity-mPa-s", "1"],
+    *["--solids-per-filtrate-kg-m3", "100"],
+]
+
+
+def test_a_filtration_test(capsys: Capture) -> None:
+    found = as_json(["test", str(LEAF_TESTS / "short_tail.csv"), *CONDITIONS], capsys)
+    (test,) = found["tests"]  # type: ignore[misc]
+    assert test["resistance_m_kg"] == pytest.approx(3.5e9) and test["medium_resistance_1_m"] == pytest.approx(1.75e10)
+    assert (test["readings"], test["readings_left_out"], test["time_zero_s"]) == (13, 3, 0.0)
+    assert main(["test", str(LEAF_TESTS / "short_tail.csv"), *CONDITIONS]) == 0
+    out = capsys.readouterr().out
+    assert "short_tail (10 of 13 readings, integral form)" in out and "3.5e+09 +- " in out and "m/kg (95 %)" in out
+    assert "- end of the test: lines 12 to 14 left out" in out
+
+
+def test_filtration_tests_of_a_file_of_measurements(capsys: Capture) -> None:
+    path = "config/measurements/synthetic_tests.yaml"
+    found = as_json(["test", str(LEAF_TESTS.parents[2] / path)], capsys)
+    assert found["tests"][0]["name"] == "synthetic_25kPa"  # type: ignore[index]
+    text = complaint(["test", path, "--area-cm2", "3"], capsys)
+    assert f"--area-cm2: goes with a CSV; {path} says it itself" in text
+
+
+def test_what_is_wrong_with_a_filtration_test_is_said(capsys: Capture) -> None:
+    balance = ["test", str(LEAF_TESTS / "balance.csv"), *CONDITIONS]
+    assert "holds masses of filtrate: give --filtrate-density-kg-m3" in complaint(balance, capsys)
+    found = as_json([*balance, "--filtrate-density-kg-m3", "789"], capsys)
+    assert found["tests"][0]["resistance_m_kg"] == pytest.approx(3.5e9)  # type: ignore[index]
+    assert "--area-cm2: must be given" in complaint(["test", str(LEAF_TESTS / "base.csv")], capsys)
+    assert "cannot be read" in complaint(["test", "none.csv", *CONDITIONS], capsys)
+
+
+def test_units_that_cannot_be(capsys: Capture) -> None:
+    light = ["resistance", "--porosity", "0.36", "--density-kg-m3", "1.18", *PMMA]
+    said = "--density-kg-m3 = 1.18: lighter than any solid (under 300 kg/m3): in g/cm3? (1180 kg/m3)"
+    assert said in complaint(light, capsys)
+    assert as_json([*light, "--trust-units"], capsys)["resistance_m_kg"] > 1e12  # type: ignore[operator]
+    fine = ["resistance", "--porosity", "0.36", "--density-kg-m3", "1180", "--mixture", "0.02:0.5,0.05:0.5"]
+    assert "0.02 to 0.05 um: no filter holds crystals so fine: were they in mm or cm?" in complaint(fine, capsys)

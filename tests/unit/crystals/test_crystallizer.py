@@ -508,7 +508,7 @@ def test_kinetics_of_the_user_come_first() -> None:
         ("shape_factor", "shape_facter", "borax.shape_facter = 0.6: no such key; allowed: nucleation_coefficient,"),
         ("shape_factor", "shape_facter", "did you mean shape_factor?"),
         ("shape_factor", "shape_facter", "borax.shape_factor = (missing): must be given"),
-        ("borax", "no", "(name) = False: must be text; put quotes around it"),
+        ("borax", "' '", "(name) = ' ': must be text; put quotes around it"),
     ],
 )
 def test_a_bad_entry_is_refused_with_file_key_and_value(tmp_path: Path, old: str, new: str, says: str) -> None:

@@ -30,16 +30,16 @@ from filtercake.calibration.rounds import (
 from filtercake.crystals.csd import mixture
 from filtercake.figures import catalogue, style
 from filtercake.figures.calibrated import CalibrationData, with_interval
-from filtercake.figures.calibration_objective import THRESHOLD, stretches
+from filtercake.figures.calibration_objective import stretches
 from filtercake.figures.catalogue import CALIBRATION_FIGURES, figures_of_calibration, module_of
 from filtercake.figures.style import save
 from filtercake.filtration.drum_filter import DrumFilter
-from filtercake.packing.replication import half_width
+from filtercake.statistics import half_width
 
 pytestmark = pytest.mark.filterwarnings("error")
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "measurements" / "synthetic_tests.yaml"
-Z = 1.959964
+Z, LIMIT = 1.959964, 3.841459
 COHESIONS = (0.0, 20.0, 40.0, 60.0, 80.0, 100.0)
 LABELS = {"a": "75/25 wt% 20/50 µm", "b": "50/50 wt% 20/50 µm", "c": "25/75 wt% 20/50 µm", "d": "20 µm", "e": "50 µm"}
 LEVELS = {"a": 22.05, "b": 21.9, "c": 21.5, "d": 22.6, "e": 20.9}
@@ -309,8 +309,19 @@ class TestObjective:
         assert spans(marked(axes, "interval")) == [pytest.approx(data.cohesion[1:])]
         (best,), (threshold,) = marked(axes, "best"), marked(axes, "threshold")
         assert best.get_xdata()[0] == data.cohesion[0] and best.get_ydata()[0] == 0.0
-        assert threshold.get_ydata()[0] == pytest.approx(3.841, abs=1e-3)
+        assert threshold.get_ydata()[0] == data.summary["threshold"] >= 3.841
         assert threshold.get_ydata()[0] < axes.get_ylim()[1] <= 20.0
+
+    def test_the_threshold_drawn_is_the_one_used(self, cases: dict[str, CalibrationData]) -> None:
+        data = cases["five"]  # with a discrepancy of four degrees of freedom
+        (axes,) = draw("calibration_objective", data).axes
+        (threshold,) = marked(axes, "threshold")
+        assert threshold.get_ydata()[0] == pytest.approx(7.709, abs=1e-3)
+        assert "95 % threshold of one parameter (7.71)" in texts(axes.figure)
+        assert spans(marked(axes, "interval")) == [pytest.approx(data.cohesion[1:])]
+        high = dataclasses.replace(data, summary={**data.summary, "threshold": 161.45})
+        (axes,) = draw("calibration_objective", high).axes
+        assert axes.get_ylim()[1] > 161.45
 
     def test_rivals_are_named_with_their_squares_and_marked(self, cases: dict[str, CalibrationData]) -> None:
         data = cases["rivals"]
@@ -341,15 +352,15 @@ class TestObjective:
         deviance = 0.05 * np.minimum((cohesion - 20.0) ** 2, 0.5 + (cohesion - 70.0) ** 2)
         table = pd.DataFrame({"cohesion_kJ_m3": cohesion, "friction": 0.0, "deviance": deviance})
         (axes,) = draw("calibration_objective", dataclasses.replace(data, objective=table)).axes
-        half, other = math.sqrt(THRESHOLD / 0.05), math.sqrt(THRESHOLD / 0.05 - 0.5)
+        half, other = math.sqrt(LIMIT / 0.05), math.sqrt(LIMIT / 0.05 - 0.5)
         expected = [(20.0 - half, 20.0 + half), (70.0 - other, 70.0 + other)]
         assert spans(marked(axes, "interval")) == [pytest.approx(ends, abs=1e-3) for ends in expected]
 
     def test_stretches_end_with_the_range(self) -> None:
         values = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
-        found = stretches(values, THRESHOLD + np.array([-1.0, 1.0, 1.0, 1.0, -3.0]))
+        found = stretches(values, LIMIT + np.array([-1.0, 1.0, 1.0, 1.0, -3.0]), LIMIT)
         assert found == [pytest.approx((0.0, 0.5)), pytest.approx((3.25, 4.0))]
-        assert stretches(values, np.zeros(5)) == [(0.0, 4.0)]
+        assert stretches(values, np.zeros(5), LIMIT) == [(0.0, 4.0)]
 
 
 class TestFittedFriction:
@@ -367,7 +378,7 @@ class TestFittedFriction:
         data = cases["friction"]
         axes = draw("calibration_objective", data).axes[0]
         (outline,) = marked(axes, "region")
-        assert list(outline.levels) == [pytest.approx(3.8415, abs=1e-3)]
+        assert list(outline.levels) == [pytest.approx(data.summary["threshold"])]
         points = np.vstack([path.vertices for path in outline.get_paths()])
         assert (points[:, 0].min(), points[:, 0].max()) == pytest.approx(data.cohesion[1:], rel=1e-3)
         assert (points[:, 1].min(), points[:, 1].max()) == pytest.approx(data.estimate("friction")[1:], rel=1e-2)

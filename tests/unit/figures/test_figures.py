@@ -25,10 +25,10 @@ from filtercake.figures.selection import StudyData
 from filtercake.figures.style import save
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman
 from filtercake.packing.porosity import slab_porosity
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import Slab, bed_height, interior_slab
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
+from filtercake.statistics import half_width
 from filtercake.study.config.study import Study
 
 pytestmark = pytest.mark.filterwarnings("error")

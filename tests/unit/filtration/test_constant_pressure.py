@@ -16,7 +16,6 @@ from scipy import stats
 from filtercake.errors import FiltercakeError, FiltrationError
 from filtercake.filtration.constant_pressure import (
     MINIMUM_READINGS,
-    OUTLIER_PROBABILITY,
     FiltrationFit,
     FiltrationTest,
     compressibility,
@@ -82,9 +81,8 @@ def holds(fit: FiltrationFit, alpha: float = ALPHA) -> bool:
 
 @pytest.mark.parametrize("fit", FORMS)
 @pytest.mark.parametrize("readings", [5, 6, 20, 301])
-@pytest.mark.parametrize("trim", [True, False])
-def test_exact_data_give_exact_resistances(fit: Callable[..., FiltrationFit], readings: int, trim: bool) -> None:
-    found = fit(make(readings), trim=trim)
+def test_exact_data_give_exact_resistances(fit: Callable[..., FiltrationFit], readings: int) -> None:
+    found = fit(make(readings))
     assert found.resistance == pytest.approx(ALPHA, rel=1e-10)
     assert found.medium_resistance == pytest.approx(MEDIUM, rel=1e-10)
     assert found.kept.all() and found.n == readings and found.left_out == 0 and found.notes == ()
@@ -165,7 +163,7 @@ def test_slower_by_a_factor_is_as_much_more_resistant(seed: int, fit: Callable[.
 def test_integral_form_is_t_over_v_with_weights_v_squared() -> None:
     test = make(change=time_noise(1))
     slope, intercept = np.polyfit(test.volume * 1e3, test.time / test.volume * 1e-3, 1, w=test.volume)
-    fit = fit_integral(test, trim=False)
+    fit = fit_integral(test)
     assert fit.slope == pytest.approx(slope * 1e6, rel=1e-9)
     assert fit.intercept == pytest.approx(intercept * 1e3, rel=1e-9)
 
@@ -179,7 +177,7 @@ def test_differential_form_is_generalised_least_squares_of_the_difference_quotie
     weights = np.linalg.inv(errors @ errors.T)
     design = np.stack([np.ones_like(middle), middle], axis=1)
     intercept, slope = np.linalg.solve(design.T @ weights @ design, design.T @ weights @ quotient)
-    fit = fit_differential(test, trim=False)
+    fit = fit_differential(test)
     assert fit.slope == pytest.approx(slope * 1e6, rel=1e-9)
     assert fit.intercept == pytest.approx(intercept * 1e3, rel=1e-9)
     ordinary = np.polyfit(middle, quotient, 1)[0]
@@ -202,7 +200,7 @@ def test_errors_are_hc3(fit: Callable[..., FiltrationFit], powers: tuple[int, ..
     hat = np.diag(design @ bread @ design.T)
     residual = test.time - design @ bread @ design.T @ test.time
     covariance = bread @ design.T @ np.diag((residual / (1.0 - hat)) ** 2) @ design @ bread
-    found = fit(test, trim=False)
+    found = fit(test)
     curvature_se, per_curvature = math.sqrt(covariance[-1, -1]) * 1e6, ALPHA / (3.29e8 / 2.025)
     assert found.resistance_se == pytest.approx(curvature_se * per_curvature, rel=1e-8)
     assert found.medium_resistance_se == pytest.approx(math.sqrt(covariance[-2, -2]) * 1e3 * 225.0 * 1e3, rel=1e-8)
@@ -215,7 +213,7 @@ def test_a_reading_that_alone_decides_a_coefficient_errs_like_the_others() -> No
     # 1 and 2 decide the line through the cluster at 3: no residual, and HC3 is 0/0 there
     volume = np.array([1.0, 2.0, 3.0, 3.0, 3.0, 3.0]) * 1e-4
     time = np.array([10.0, 35.0, 70.0, 71.0, 72.0, 74.0])
-    fit = fit_differential(dataclasses.replace(make(6), time=time, volume=volume), trim=False)
+    fit = fit_differential(dataclasses.replace(make(6), time=time, volume=volume))
     common = np.var(time[2:], ddof=1)
     design = np.vander(np.array([1.0, 2.0, 3.0, 3.0, 3.0, 3.0]), 3)
     ordinary = math.sqrt(common * np.linalg.inv(design.T @ design)[0, 0]) * 1e8
@@ -262,97 +260,9 @@ def test_intervals_cover(fit: Callable[..., FiltrationFit], noise: Any, readings
     assert lowest <= medium <= highest
     # and their width is the real scatter's, which coverage alone would not tell for the mean of many
     scatter = np.std([found.resistance for found in fits])
-    assert np.median([found.resistance_se for found in fits]) == pytest.approx(scatter, rel=0.3)
-
-
-@pytest.mark.parametrize("fit", FORMS)
-@pytest.mark.parametrize("noise", [time_noise, volume_noise])
-def test_undisturbed_tests_keep_their_readings(fit: Callable[..., FiltrationFit], noise: Any) -> None:
-    shortened = np.mean([fit(make(change=noise(seed))).left_out > 0 for seed in range(SEEDS)])
-    assert shortened <= OUTLIER_PROBABILITY + 3.0 * math.sqrt(OUTLIER_PROBABILITY / SEEDS)
-
-
-@pytest.mark.parametrize("fit", FORMS)
-def test_one_percent_of_undisturbed_tests_do_lose_readings(fit: Callable[..., FiltrationFit]) -> None:
-    # a rule that never leaves anything out would pass all but this; 18 are expected
-    shortened = sum(fit(make(change=time_noise(seed))).left_out > 0 for seed in range(3 * SEEDS))
-    assert 6 <= shortened <= 31
-
-
-# --- the start-up ---
-
-
-@pytest.mark.parametrize("fit", FORMS)
-def test_a_disturbed_start_is_left_out(fit: Callable[..., FiltrationFit]) -> None:
-    test = make(change=held_back(70, 70, 70, 70))
-    found, whole = fit(test), fit(test, trim=False)
-    assert found.kept.tolist() == [False] * 4 + [True] * 16
-    assert found.n == 16 and found.left_out == 4 and found.dof == 16 - (2 if fit is fit_integral else 3)
-    (note,) = found.notes
-    assert "first 4 of 20 readings are left out" in note and f"{test.time[3]:.4g} s, 172.1 mL" in note
-    assert whole.left_out == 0 and not whole.notes
-
-
-@pytest.mark.parametrize("fit", FORMS)
-def test_a_disturbed_start_then_does_no_harm(fit: Callable[..., FiltrationFit]) -> None:
-    right, wrong = [], []
-    for seed in range(300):
-        test = make(60, change=held_back(*[60] * 12, seed=seed, size=0.15))
-        found = fit(test)
-        right.append(found.left_out == 12 and holds(found))
-        wrong.append(holds(fit(test, trim=False)))
-    # 0.95 of the intervals less three standard deviations of the count, and the 1 % that lose more readings
-    assert np.mean(right) >= 0.94 - 3.0 * math.sqrt(0.95 * 0.05 / 300)
-    assert np.mean(wrong) < 0.05
-
-
-def test_everything_before_the_first_outlier_goes() -> None:
-    found = fit_integral(make(change=held_back(0, 0, 0, 90)))
-    assert found.kept.tolist() == [False] * 4 + [True] * 16
-
-
-def test_the_later_half_is_never_left_out() -> None:
-    found = fit_integral(make(21, change=held_back(*[90] * 10)))
-    assert found.kept.tolist() == [False] * 10 + [True] * 11
-    # not even where a reading in it is off
-    assert fit_integral(make(21, change=held_back(*[0] * 10, 60))).kept[10:].all()
-    assert not fit_integral(make(21, change=held_back(*[0] * 9, 60))).kept[9]
-
-
-def test_few_readings_are_all_used() -> None:
-    # five, and the differential form's six, are what the first fit needs
-    found = fit_differential(make(5, change=lambda t, v: (t, v - np.array([90e-6, 0.0, 1e-6, 0.0, 0.0]))))
-    assert found.kept.all()
-
-
-def test_round_off_is_no_outlier() -> None:
-    def rounded(time: np.ndarray, volume: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        time[0] *= 1.0 + 1e-12
-        return time, volume
-
-    assert fit_integral(make(change=rounded)).kept.all()
-    found = fit_integral(make(change=lambda t, v: (np.where(t == t[0], 1.0001 * t, t), v)))
-    assert found.left_out == 1
-
-
-def test_a_pressure_that_rises_slowly_shifts_the_time_zero() -> None:
-    # dP (1 - exp(-t/2 s)): t - 2 s (1 - exp(-t/2 s)) = b V + a V^2, a delay of 2 s once the pressure is there
-    def ramp(seed: int) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
-        def change(time: np.ndarray, volume: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            t = time + 2.0
-            for _ in range(100):
-                t = time + 2.0 * (1.0 - np.exp(-t / 2.0))
-            return time_noise(seed, 0.1)(t, volume)
-
-        return change
-
-    pairs = [tuple(fit(make(40, change=ramp(seed))) for fit in FORMS) for seed in range(200)]
-    assert np.mean([holds(differential) for _, differential in pairs]) >= 0.95 - 3.0 * math.sqrt(0.95 * 0.05 / 200)
-    assert np.mean([holds(integral) for integral, _ in pairs]) < 0.05
-    assert np.mean([differential.time_offset for _, differential in pairs]) == pytest.approx(
-        2.0, abs=0.1
-    )  # the first seconds pull
-    assert all("time zero" in str(disagreement(*pair)) for pair in pairs)
+    assert np.median([found.resistance_se for found in fits]) == pytest.approx(
+        scatter, rel=0.4 if readings < 10 else 0.3
+    )
 
 
 # --- what is doubtful, and what is refused ---
@@ -435,15 +345,15 @@ def test_readings_must_fit_together() -> None:
         dataclasses.replace(test, volume=test.volume[1:])
     with pytest.raises(FiltrationError, match=r"times must ascend"):
         dataclasses.replace(test, time=test.time[::-1])
-    with pytest.raises(FiltrationError, match=r"4 readings: must be at least 5"):
+    with pytest.raises(FiltrationError, match=r"1 readings: must be at least 2"):
         make(MINIMUM_READINGS - 1)
-    assert make(MINIMUM_READINGS).time.size == 5
+    assert make(MINIMUM_READINGS).time.size == 2
 
 
 @pytest.mark.parametrize("fit", FORMS)
 def test_volumes_that_stand_still_are_refused(fit: Callable[..., FiltrationFit]) -> None:
-    stopped = make(change=lambda t, v: (t, np.minimum(v, v[6])))
-    with pytest.raises(FiltrationError, match="run: the volumes of the later readings hardly differ"):
+    stopped = make(change=lambda t, v: (t, np.full_like(v, v[6])))
+    with pytest.raises(FiltrationError, match="run: the volumes of the readings hardly differ"):
         fit(stopped)
 
 

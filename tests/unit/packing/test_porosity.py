@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from filtercake.packing.contacts import find_contacts
 from filtercake.packing.porosity import (
     measure,
     paper_count_porosity,
@@ -20,6 +21,9 @@ from filtercake.packing.result import Packing
 from filtercake.packing.slab import Slab, bed_height, interior_slab, why_too_thin
 
 UM = 1e-6
+
+PAIR = ((1.1, 0.0, 0.0), (1.1, 0.3, 0.35), (2.3, 0.0, 0.0), (2.3, 0.55, -0.2))
+"""Two pairs of overlapping spheres: height of the larger one, and how far the smaller one is from it."""
 
 Arrays = tuple[np.ndarray, np.ndarray]
 
@@ -112,6 +116,23 @@ def test_slab_porosity_against_a_count_of_random_points() -> None:
     porosity = slab_porosity(position, radius, length, slab)
     assert 0.7 < porosity < 0.95
     assert porosity == pytest.approx(1.0 - inside.mean(), abs=4.0 * np.sqrt(inside.mean() * 0.9 / len(points)))
+
+
+def test_what_two_spheres_share_counts_once() -> None:
+    # a chain of overlapping pairs across the slab's faces, against a count of random points: 4 sd allowed
+    rng = np.random.default_rng(3)
+    length, slab = 4.0, Slab(1.0, 2.0)
+    position = np.array([[x + dx, y, z + dz] for x in (0.5, 2.5) for y in (0.6, 2.6) for z, dx, dz in PAIR])
+    radius = np.tile([0.5, 0.3], 8)
+    assert len(find_contacts(position, radius, length).overlap) == 8
+    points = rng.uniform([0, 0, slab.lower], [length, length, slab.upper], (1_000_000, 3))
+    inside = np.zeros(len(points), dtype=bool)
+    for p, r in zip(position, radius, strict=True):
+        inside |= ((points - p) ** 2).sum(axis=1) < r**2
+    error = 4.0 * math.sqrt(inside.mean() / len(points))
+    assert slab_porosity(position, radius, length, slab) == pytest.approx(1.0 - inside.mean(), abs=error)
+    twice = (volume_below(2.0, position[:, 2], radius) - volume_below(1.0, position[:, 2], radius)).sum() / 16.0
+    assert twice - inside.mean() > 4.0 * error
 
 
 @pytest.mark.parametrize("lower", [0.0, 0.3, 1.0, 1.77])

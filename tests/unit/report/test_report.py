@@ -34,7 +34,7 @@ FOOTER = "n = 3 packings, none failed; LIGGGHTS"
     [
         (0.35221, 0.00124, "0.3522 ± 0.0012"),
         (1.1426e9, 5.7e7, "(1.143 ± 0.057)·10⁹ m/kg"),
-        (0.4, np.nan, "0.4"),
+        (0.4, np.nan, "0.4 ± –"),
         (np.nan, np.nan, "no accepted packing"),
         (0.395, 0.54, "0.40 ± 0.54"),
     ],

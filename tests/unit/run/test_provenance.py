@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import shutil
 import subprocess
@@ -51,6 +52,19 @@ def test_modules_above_are_left_out(library: Path) -> None:
     assert found == {"__init__.py", "inner/__init__.py", "inner/ground.py", "inner/loop.py"}
 
 
+def test_every_import_of_the_library_is_found() -> None:
+    """By the search for its words, as the parser finds them."""
+    for path in ROOT.rglob("*.py"):
+        names: list[str] = []
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names += [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        own = [name.removeprefix("filtercake.") for name in names if name.startswith("filtercake.")]
+        assert set(provenance._imports(path)) == {file for name in own if (file := provenance._file_of(name))}, path
+
+
 def test_a_missing_module_is_an_error(library: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"no module 'inner\.nothing'"):
         sources("inner.nothing")
@@ -83,7 +97,8 @@ def test_packing_depends_on_its_engines_and_not_on_studies_and_figures() -> None
 def test_lower_floors_import_nothing_from_above() -> None:
     assert names("units") == {"__init__.py", "units.py"}
     assert names("errors") == {"__init__.py", "errors.py"}
-    rooms = {"crystals/__init__.py", "crystals/csd.py", "filtration/__init__.py", "filtration/resistance.py"}
+    read = {f"crystals/{name}.py" for name in ("__init__", "csd", "instruments", "cells", "column_names")}
+    rooms = read | {"filtration/__init__.py", "filtration/resistance.py"}
     assert names("filtration.resistance") == rooms | {"__init__.py", "errors.py", "units.py", "user_files.py"}
 
 
@@ -179,11 +194,8 @@ def test_an_unknown_engine_has_no_files() -> None:
         packing_sources("magic")
 
 
-def test_a_file_behind_many_modules_is_parsed_once(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    parsed = []
-    parse = provenance.ast.parse
-    with monkeypatch.context() as patch:  # pytest parses as well
-        patch.setattr(provenance.ast, "parse", lambda text: parsed.append(text) or parse(text))
-        for module in ("top", "middle", "beside", "inner.ground"):
-            sources(module)
-    assert len(parsed) == 7  # every file once
+def test_a_file_behind_many_modules_is_read_once(library: Path) -> None:
+    provenance._imports.cache_clear()
+    for module in ("top", "middle", "beside", "inner.ground"):
+        sources(module)
+    assert provenance._imports.cache_info().misses == 7  # every file once

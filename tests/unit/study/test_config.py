@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,14 @@ from filtercake.packing.cloud import BedSize
 from filtercake.packing.scene import Scene
 from filtercake.study import engine_choice
 from filtercake.study.config.study import Study, Workflow
-from filtercake.study.loading import find_studies, load_studies, load_study, load_workflow, read_yaml
+from filtercake.study.loading import (
+    find_studies,
+    load_studies,
+    load_study,
+    load_workflow,
+    read_yaml,
+    with_names_as_written,
+)
 from filtercake.study.points import expand
 from filtercake.study.scenes import bed_of
 
@@ -281,7 +289,6 @@ BROKEN: list[tuple[Any, ...]] = [
     pytest.param(
         "  bimodal:", "  ../bimodal:", "csds.../bimodal", "'../bimodal'", "must be letters, digits", id="path"
     ),
-    pytest.param("  bimodal:", "  5:", "csds[5]", "5", "must be letters, digits", id="name that is a number"),
     pytest.param(
         "    label: half and half",
         "    label: [1]",
@@ -396,7 +403,7 @@ def test_a_missing_csv_is_named(write_study, good_study: str, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"\x00\xff\xfe garbage", "must be UTF-8 text"),
+        (b"\x00\xff\xfe garbage", "is not text (UTF-8, UTF-16 or Windows-1252)"),
         (b"lorem ipsum\ndolor\n", "needs exactly one column 'size'"),
         (b"", "holds no class"),
         (b"size_um,volume_fraction\n20,0.5\nx,0.5\n", "line 3: 'x' is not a number"),
@@ -415,7 +422,61 @@ def test_an_unusable_csv_is_named(write_study, good_study: str, tmp_path: Path, 
 def test_a_distribution_has_exactly_one_source(write_study, good_study: str, source: str) -> None:
     problem = the_problem(write_study(good_study.replace("    mixture:\n" + MIXTURE, source)))
     assert problem.key == "csds.bimodal"
-    assert "needs exactly one of mixture, file and residence_time_min" in problem.allowed
+    assert "needs exactly one of mixture, file, lognormal, rosin_rammler and residence_time_min" in problem.allowed
+
+
+def test_a_law_is_a_distribution_without_its_rare_classes(write_study, good_study: str) -> None:
+    source = "    lognormal: {d10_um: 20, d50_um: 40, d90_um: 80}\n"
+    study = load_study(write_study(good_study.replace("    mixture:\n" + MIXTURE, source)))
+    found = study.csds["bimodal"]
+    assert found.full.sum_x_over_d2 == pytest.approx(math.exp(2 * (math.log(4) / 2.5631) ** 2) / 40e-6**2, rel=1e-4)
+    assert found.truncated.size.size < found.full.size.size
+    assert study.model.csds["bimodal"].truncate_below_volume_fraction == 0.001
+    again = type(study.model).model_validate(study.model.model_dump(mode="json"))
+    assert again.csds["bimodal"] == study.model.csds["bimodal"]
+    whole = source + "    truncate_below_volume_fraction: 0\n"
+    study = load_study(write_study(good_study.replace("    mixture:\n" + MIXTURE, whole)))
+    assert study.csds["bimodal"].truncated.size.size == found.full.size.size
+
+
+def test_a_law_that_is_none_is_named(write_study, good_study: str) -> None:
+    source = "    rosin_rammler: {size_um: 60, exponent: 2}\n"
+    problem = the_problem(write_study(good_study.replace("    mixture:\n" + MIXTURE, source)))
+    assert (problem.key, problem.value) == ("csds.bimodal.rosin_rammler", "size_um 60, exponent 2")
+    assert "must be above 2" in problem.allowed
+
+
+@pytest.mark.parametrize("name", ["01", "NA", '"null"', "null", "nan", "1e5", "2024_05", "yes", "0x1F", "1.5e3"])
+def test_names_are_kept_as_they_are_written(write_study, good_study: str, name: str) -> None:
+    if "." in name:
+        assert "must be letters" in the_problem(write_study(good_study.replace("  bimodal:", f"  {name}:"))).allowed
+        return
+    quoted = f'"{name}"' if name in ("null", "yes") else name
+    text = good_study.replace("  bimodal:", f"  {name}:").replace("csd: bimodal", f"csd: [{quoted}]")
+    text = text.replace("label: half and half", f"label: {quoted}")
+    study = load_study(write_study(text))
+    bare = name.strip('"')
+    assert list(study.csds) == [bare]
+    assert study.model.sweeps[0].csd == [bare]
+    assert study.csds[bare].label == bare
+
+
+@pytest.mark.parametrize("name", ["null", "yes"])
+def test_a_name_that_yaml_swallows_must_be_quoted(write_study, good_study: str, name: str) -> None:
+    text = good_study.replace("  bimodal:", f"  {name}:").replace("csd: bimodal", f"csd: [{name}]")
+    assert "write it in quotes" in the_problem(write_study(text)).allowed
+
+
+@pytest.mark.parametrize(("name", "read"), [("007", 7), ("2024_05", 202405), ("1e5", 1e5), ("nan", math.nan)])
+def test_names_that_snakemake_takes_for_numbers_are_given_back(tmp_path: Path, name: str, read: float) -> None:
+    config = {"studies": read, "results": "results"}
+    named = with_names_as_written(config, [], [f"studies={name}", "results=results"])
+    assert load_workflow(named, "config.yaml").studies == [name]
+    file = tmp_path / "config.yaml"
+    file.write_text(f"studies: [{name}, pmma]\n")
+    parsed = [read if name in ("007", "2024_05") else name, "pmma"]
+    named = with_names_as_written({"studies": parsed}, [file], [])
+    assert load_workflow(named, "config.yaml").studies == [name, "pmma"]
 
 
 def test_a_truncation_that_leaves_nothing_is_named(write_study, good_study: str) -> None:

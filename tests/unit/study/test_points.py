@@ -15,12 +15,10 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 from filtercake.crystals.csd import from_table, mixture, to_table
 from filtercake.filtration.resistance import carman_sauter, kozeny_carman
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed
-from filtercake.packing.replication import half_width
 from filtercake.packing.result import Packing, write_json
 from filtercake.packing.scene import Scene, digest, stage_seed
 from filtercake.results.replicates import REPLICATE_COLUMNS, SUMMARY_COLUMNS, replicates_table, summarise
@@ -248,34 +246,6 @@ def test_a_cloud_s_seed_outlives_a_csv_round_trip(make_scene, pmma, tmp_path: Pa
 def test_a_spec_survives_json(make_scene) -> None:
     scene: Scene = make_scene(time_step=1 / 3 * 1e-6)
     assert Scene.from_dict(json.loads(json.dumps(scene.as_dict()))) == scene
-
-
-# --- intervals -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("n", [2, 3, 8, 30])
-@pytest.mark.parametrize("confidence", [0.9, 0.95, 0.99])
-def test_half_width_is_the_student_interval(n: int, confidence: float) -> None:
-    values = np.random.default_rng(n).normal(0.36, 0.003, n)
-    low, high = stats.t.interval(confidence, n - 1, loc=values.mean(), scale=stats.sem(values))
-    assert half_width(values, confidence) == pytest.approx(0.5 * (high - low), rel=1e-12)
-
-
-def test_half_width_by_the_table() -> None:
-    # t(0.975, 2) = 4.3027; sd of (-1, 0, 1) = 1; sqrt(3)
-    assert half_width(np.array([-1.0, 0.0, 1.0])) == pytest.approx(4.302653 / np.sqrt(3), rel=1e-6)
-
-
-@pytest.mark.parametrize("n", [0, 1])
-def test_one_value_has_no_interval(n: int) -> None:
-    assert np.isnan(half_width(np.full(n, 0.36)))
-
-
-def test_student_intervals_cover_as_often_as_they_say() -> None:
-    # 2000 samples of three: the share covered has sd sqrt(0.95*0.05/2000) = 0.5 %, three of which are allowed
-    samples = np.random.default_rng(2).normal(0.36, 0.003, (2000, 3))
-    covered = [abs(sample.mean() - 0.36) <= half_width(sample) for sample in samples]
-    assert np.mean(covered) == pytest.approx(0.95, abs=0.015)
 
 
 # --- tables --------------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from filtercake.packing.replication import half_width
+from filtercake.statistics import half_width
 from filtercake.study.config.sweep import SWEPT
 from filtercake.validation.agreement import compare_sizes
 

@@ -11,6 +11,7 @@ import pytest
 
 from filtercake.crystals.csd import mixture, truncate
 from filtercake.packing.scene import Scene
+from filtercake.statistics import difference_half_width, half_width
 from filtercake.study.loading import load_study
 from filtercake.study.points import base_point
 from filtercake.validation import error_against_time
@@ -78,6 +79,21 @@ def test_the_noise_of_a_mean_is_no_bias() -> None:
     row = table.iloc[0]
     assert abs(row["bias"]) > 0
     assert row["error"] == pytest.approx(row["sd"])
+
+
+def test_the_interval_of_a_bias_is_welchs() -> None:
+    values, known = [0.353, 0.355, 0.351, 0.354], [0.349, 0.350, 0.352]
+    table = pd.DataFrame({"study": "a", "friction": 0.0, "status": "ok", "porosity": known})
+    row = errors("pmma", packings(values), reference_of(table, "a", 0.0)).iloc[0]
+    assert row["bias_ci95"] == pytest.approx(difference_half_width(values, known))
+    exact = errors("pmma", packings(values), REFERENCE).iloc[0]
+    assert exact["bias_ci95"] == pytest.approx(half_width(values))
+
+
+def test_one_packing_has_neither_spread_nor_error() -> None:
+    row = errors("pmma", packings([0.353]), Reference(0.35, 0.0005, 20.0)).iloc[0]
+    assert row["bias"] == pytest.approx(0.003)
+    assert row[["sd", "bias_se", "bias_ci95", "error"]].isna().all()
 
 
 def test_packings_that_were_not_accepted_do_not_count() -> None:
@@ -203,12 +219,15 @@ def test_choices_stand_against_the_default() -> None:
     timings = pd.DataFrame(rows).assign(
         porosity_from_floor=lambda t: t["porosity"] + 0.008, porosity_paper_count=lambda t: t["porosity"] + 0.009
     )
+    # both ensembles of two, 0.002 apart: t(2) = 4.3027 and a standard error of 0.001 each
     full, packed = mixture([10e-6, 30e-6], [0.1, 0.9]), mixture([30e-6], [1.0])
     table = error_against_time.choice_table(timings, listed, full, packed).set_index("choice")
     assert table.loc["soft contacts", "porosity_change"] == pytest.approx(0.01)
     assert table.loc["soft contacts", "resistance_change"] == pytest.approx(
         (0.639 / 0.361**3) / (0.649 / 0.351**3) - 1.0
     )
+    assert table.loc["soft contacts", "porosity_change_ci95"] == pytest.approx(4.3027 * math.sqrt(2.0) * 1e-3, rel=1e-4)
+    assert table.loc["floor layer", "porosity_change_ci95"] == pytest.approx(0.0, abs=1e-12)  # the same packings
     assert table.loc["floor layer", "porosity_change"] == pytest.approx(0.008)
     law = packed.sum_x_over_d2 / full.sum_x_over_d2 - 1.0
     assert table.loc["truncation, in the resistance law", "resistance_change"] == pytest.approx(law)

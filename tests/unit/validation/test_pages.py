@@ -22,7 +22,14 @@ def error_rows() -> pd.DataFrame:
     def row(
         axis: str, engine: str, seconds: float, error: float, estimator: str = "interior slab"
     ) -> dict[str, object]:
-        values = {"sd": error, "bias": 0.0, "bias_se": 0.0005, "error": error, "resistance_error": 10 * error}
+        values = {
+            "sd": error,
+            "bias": 0.0,
+            "bias_se": 0.0005,
+            "bias_ci95": 0.0010,
+            "error": error,
+            "resistance_error": 10 * error,
+        }
         place = {
             "case": "pmma",
             "axis": axis,
@@ -99,15 +106,24 @@ def test_the_benchmark_page_holds_the_tables_numbers() -> None:
     assert "Failed: engine (liggghts) (3 of 8)." in page
     assert "| pmma | count | 0.3500 |" in page
     assert "Analytic models are off by 0.0430 (Farr-Groot)." in page
+    assert "+0.0000 +- 0.0010" in page
     assert "{{" not in page
     assert "nan" not in page.lower().replace("nano", "")
+
+
+def test_what_one_packing_does_not_tell_is_a_dash() -> None:
+    errors = error_rows().assign(on_front=True)
+    errors.loc[errors["axis"] == "default", ["n", "sd", "bias_se", "bias_ci95", "error"]] = [1, *[np.nan] * 4]
+    data = REPOSITORY / "docs" / "data"
+    page = pages.benchmark(TEMPLATES / "benchmark.md.j2", errors, references(), choice_rows(), coverage_rows(), data)
+    assert "| pmma | interior slab | 0.3500 | +0.0000 +- – | – | – |" in page
 
 
 def stress_rows() -> pd.DataFrame:
     rows = []
     for k, case in enumerate(cases(["embedded", "liggghts"])):
         good = case.numbers["time_step"] < 1.0
-        numbers = {"bias": 0.001 * (k % 7 - 3), "bias_se": 0.001} if good else {"bias": np.nan, "bias_se": np.nan}
+        numbers = {"bias": 0.001 * (k % 7 - 3), "bias_ci95": 0.002} if good else {"bias": np.nan, "bias_ci95": np.nan}
         place = {name: getattr(case, name) for name in ("family", "engine", "x_name", "x", "y_name", "y")}
         rows.append(
             {
@@ -137,8 +153,11 @@ def test_the_stability_page_tells_the_wrong_ones() -> None:
     assert "data/stability.csv" in page and len(page.splitlines()) < 100
     place = table.index[table["fence"] == "allowed"][0]
     table.loc[place, ["bias", "outcome"]] = [0.02, "inaccurate"]
+    table.loc[table["fence"] == "warned", "outcome"] = "undecided"
     page = pages.stability(TEMPLATES / "stability.md.j2", table)
     assert "+0.0200 +- 0.0020" in page
+    warned = ((table["fence"] == "warned") & (table["engine"] == "embedded")).sum()
+    assert f"| embedded | warned | 0 | {warned} | 0 |" in page
     assert "Of these, 1 pass the configuration without a word" in page
 
 
@@ -187,8 +206,9 @@ def test_the_fence_of_a_case_is_todays() -> None:
 
 def test_figures_draw_every_case() -> None:
     with applied():
-        maps = stability_maps.draw(with_fence(stress_rows()))
+        maps = stability_maps.draw(with_fence(stress_rows()).replace({"outcome": {"exploded": "undecided"}}))
         maps.canvas.draw()
+        assert "undecided" in [text.get_text() for text in maps.legends[0].get_texts()]
         plot = run_time_error.draw(error_rows(), references())
         plot.canvas.draw()
     assert len([axes for axes in maps.axes if axes.get_visible()]) == len(

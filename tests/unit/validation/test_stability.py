@@ -85,7 +85,7 @@ def test_outcomes_of_a_safe_a_wild_and_a_refused_case(monkeypatch) -> None:
     monkeypatch.setattr(stability, "PARTICLES", 400)
     table = run([case(), case(x=2.0), case("youngs_modulus_MPa", 0.5, "cohesion_kJ_m3", 100.0)], replicates=2)
     safe, wild, soft = table.to_dict("records")
-    assert safe["outcome"] in ("ok", "inaccurate")
+    assert safe["outcome"] in ("ok", "undecided", "inaccurate")
     assert safe["n_accepted"] == 2
     assert safe["momentum_drift"] < 1e-10
     assert 0.0 <= safe["energy_gain"] < 0.01
@@ -98,7 +98,7 @@ def test_outcomes_of_a_safe_a_wild_and_a_refused_case(monkeypatch) -> None:
 def test_one_accepted_packing_of_many_is_no_success(monkeypatch) -> None:
     results = iter([stability._Try("ok", porosity=0.35), stability._Try("unsettled", "still moving")] * 3)
     monkeypatch.setattr(stability, "_try", lambda *_: next(results))
-    row = stability._judge(case(), [0.35, 0.351], 4)
+    row = stability._judge(case(), {0: 0.35, 1: 0.351}, 4)
     assert row["outcome"] == "unsettled"
     assert (row["n"], row["n_accepted"]) == (4, 2)
     assert row["reason"] == "still moving"
@@ -106,17 +106,61 @@ def test_one_accepted_packing_of_many_is_no_success(monkeypatch) -> None:
 
 def test_what_never_rests_is_not_tried_for_ever(monkeypatch) -> None:
     monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("unsettled", "still moving"))
-    row = stability._judge(case(), [0.35, 0.351], 10)
+    row = stability._judge(case(), {0: 0.35, 1: 0.351}, 10)
     assert (row["n"], row["n_accepted"], row["outcome"]) == (stability.HOPELESS, 0, "unsettled")
-    assert stability._reference(scene(), 10) == []
+    assert stability._reference(scene(), 10) == {}
 
 
 def test_a_bias_beyond_its_uncertainty_is_inaccurate(monkeypatch) -> None:
-    values = iter([0.360, 0.3601, 0.3599, 0.360])
-    monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("ok", porosity=next(values)))
-    row = stability._judge(case(), [0.350, 0.3501, 0.3499], 4)
+    row = judged(monkeypatch, [0.360, 0.3601, 0.3599, 0.360], [0.350, 0.3501, 0.3499])
     assert row["outcome"] == "inaccurate"
     assert row["bias"] == pytest.approx(0.01)
+
+
+def judged(monkeypatch, porosities: list[float], reference: list[float]) -> dict[str, object]:
+    """Judge a case whose packings are all accepted; a reference of nan was not."""
+    values = iter(porosities)
+    monkeypatch.setattr(stability, "_try", lambda *_: stability._Try("ok", porosity=next(values)))
+    known = {k: value for k, value in enumerate(reference) if not math.isnan(value)}
+    return stability._judge(case(), known, len(porosities))
+
+
+def test_packings_are_held_against_the_reference_of_the_same_cloud(monkeypatch) -> None:
+    clouds = np.array([0.33, 0.36, 0.35, 0.34])
+    row = judged(monkeypatch, list(clouds + np.array([1e-4, 3e-4, 2e-4, 2e-4])), list(clouds))
+    assert (row["outcome"], row["bias"]) == ("ok", pytest.approx(2e-4))
+    # t(3) = 3.1824; the differences' spread is 8.165e-5
+    assert row["bias_ci95"] == pytest.approx(3.1824 * 8.165e-5 / 2.0, rel=1e-3)
+    # the second cloud's reference failed: neither takes part
+    row = judged(monkeypatch, [0.331, 0.5, 0.351, 0.341], [0.33, math.nan, 0.35, 0.34])
+    assert row["bias"] == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize(
+    ("porosities", "reference"),
+    [
+        ([0.350, 0.354, 0.346], [0.350, 0.350, 0.350]),  # no bias, but +- 0.01
+        ([0.351, 0.351], [0.350, math.nan]),  # one pair has no spread
+        ([0.351, 0.351], []),
+    ],
+)
+def test_what_cannot_be_told_is_undecided(monkeypatch, porosities: list[float], reference: list[float]) -> None:
+    assert judged(monkeypatch, porosities, reference)["outcome"] == "undecided"
+
+
+@pytest.mark.parametrize(
+    ("bias", "half", "expected"),
+    [
+        (0.0009, 0.001, "ok"),
+        (-0.0011, 0.001, "undecided"),
+        (0.0029, 0.001, "undecided"),
+        (-0.0031, 0.001, "inaccurate"),
+        (math.nan, math.nan, "undecided"),
+        (0.0, math.nan, "undecided"),
+    ],
+)
+def test_the_verdict_is_the_intervals(bias: float, half: float, expected: str) -> None:
+    assert stability.verdict(bias, half) == expected
 
 
 def state(height: list[float], energy: list[float], velocity: np.ndarray) -> SettledState:
@@ -153,11 +197,12 @@ def test_the_fence_knows_what_liggghts_does_not_take() -> None:
 
 def test_undetected_is_wrong_accepted_and_unannounced() -> None:
     rows = [
-        (0.010, 0.001, 3, "allowed"),
-        (0.010, 0.001, 3, "warned"),
-        (0.010, 0.001, 0, "allowed"),
-        (0.010, 0.004, 3, "allowed"),
-        (-0.010, 0.001, 3, "allowed"),
+        (0.010, 0.002, 3, "allowed"),
+        (0.010, 0.002, 3, "warned"),
+        (0.010, 0.002, 0, "allowed"),
+        (0.010, 0.008, 3, "allowed"),
+        (-0.010, 0.002, 3, "allowed"),
+        (0.010, math.nan, 1, "allowed"),
     ]
-    table = pd.DataFrame(rows, columns=["bias", "bias_se", "n_accepted", "fence"])
+    table = pd.DataFrame(rows, columns=["bias", "bias_ci95", "n_accepted", "fence"])
     assert list(undetected(table).index) == [0, 4]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ import pytest
 
 from filtercake.crystals.csd import mixture
 from filtercake.packing.scene import Scene
+from filtercake.validation import growth
 from filtercake.validation.agreement import compare_engines
 from filtercake.validation.growth import Case, even_distribution, time_growth
 from filtercake.validation.timing import compare, contender, time_in_turn, warm_up
@@ -62,8 +64,8 @@ def test_ratios_and_intervals_of_made_up_timings() -> None:
     assert fast["times_faster"] == pytest.approx(105.0 / 2.1)
     assert fast["n_not_accepted"] == 1
     assert fast["difference"] == pytest.approx(0.001)
-    # Student's t at one degree of freedom: 12.706 x 0.0014142 / sqrt(2)
-    assert fast["difference_ci95"] == pytest.approx(np.hypot(1, 1) * 12.7062 * 0.001, rel=1e-4)
+    # equal spreads of two each: Welch's two degrees of freedom, t = 4.3027, standard errors of 0.0014142 / sqrt(2)
+    assert fast["difference_ci95"] == pytest.approx(np.hypot(1, 1) * 4.3027 * 0.001, rel=1e-4)
     assert bool(fast["same_porosity"])
 
 
@@ -85,15 +87,22 @@ def test_ensembles_agree_differ_or_say_nothing() -> None:
             + ensemble("two", list(0.351 + spread), friction=0.1)
             + ensemble("one", list(0.350 + 9 * spread), friction=0.2)
             + ensemble("two", list(0.350 + 9 * spread), friction=0.2)
+            + ensemble("one", list(0.350 + spread), friction=0.3)
+            + ensemble("two", list(0.3506 + spread), friction=0.3)
+            + ensemble("one", [0.350], friction=0.4)
+            + ensemble("two", [0.350], friction=0.4)
         ),
         "one",
         "two",
     )
     # standard error of each: sqrt(24/35) 0.001 / 6
     assert table["difference_se"].iloc[0] == pytest.approx(np.sqrt(2 * 24 / 35) * 0.001 / 6)
-    assert list(table["sharp"]) == [True, True, False]
-    assert list(table["agree"]) == [True, False, False]
-    assert list(table["n_one"]) == [36, 36, 36]
+    # of 35 degrees of freedom each, twice: t(70) = 1.9944; 0.0006 are three standard errors
+    assert table["difference_ci95"].iloc[0] == pytest.approx(1.9944 * table["difference_se"].iloc[0], rel=1e-4)
+    assert list(table["sharp"]) == [True, True, False, True, False]
+    assert list(table["agree"]) == [True, False, False, False, False]
+    assert list(table["n_one"]) == [36, 36, 36, 36, 1]
+    assert np.isnan(table["difference_ci95"].iloc[-1])
 
 
 def test_growth_is_timed_per_sphere_and_step() -> None:
@@ -103,6 +112,15 @@ def test_growth_is_timed_per_sphere_and_step() -> None:
     expected = 1e9 * table["wall_s"] / table["steps"] / table["particles"]
     assert table["ns_per_particle_step"].to_numpy() == pytest.approx(expected.to_numpy())
     assert list(table["series"]) == ["particles", "size_ratio"]
+
+
+def test_a_case_is_held_against_the_first_one_before_and_after(monkeypatch: pytest.MonkeyPatch) -> None:
+    paces = iter([10.0, 11.0, 20.0, 50.0, 30.0])  # before, first case, after, second case, after
+    state = SimpleNamespace(steps=100, wall_time=1.0)
+    monkeypatch.setattr(growth, "_time", lambda *_: (state, next(paces)))
+    table = time_growth(SCENE, [Case("particles", 150, 4.0), Case("particles", 300, 4.0)])
+    assert list(table["ns_per_particle_step"]) == [11.0, 50.0]
+    assert list(table["reference_ns"]) == [15.0, 25.0]
 
 
 @pytest.mark.parametrize("ratio", [2.0, 30.0])

@@ -6,23 +6,21 @@ import math
 import time
 import zipfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numba
 import numpy as np
-from numba import get_num_threads, set_num_threads
 
 from filtercake import __version__
 from filtercake.errors import EngineError
 from filtercake.packing.engines.base import Engine, SettleRequest, parallelism
-from filtercake.packing.engines.embedded_bed import Bed
 from filtercake.packing.pictures import write_vtk
 from filtercake.packing.result import SettledState, publish
 from filtercake.packing.scene import Scene
 from filtercake.packing.settling import TYPICAL_SOLIDS, Trajectory
 from filtercake.units import FloatArray
 
-# of the thread pools, the one with the least cost per parallel part of a time step comes first
-numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
+if TYPE_CHECKING:
+    from filtercake.packing.engines.embedded_bed import Bed
 
 PROGRESS_SECONDS = 20.0
 STATE_SECONDS = 60.0
@@ -47,9 +45,12 @@ class Embedded(Engine):
 
     def settle(self, request: SettleRequest) -> SettledState:
         """Let the cloud settle (see :class:`filtercake.packing.engines.base.Engine`)."""
+        # who plans a study need not wait for the compiler
+        from filtercake.packing.engines.embedded_bed import Bed, use_threads
+
         threads = parallelism(request.scene)
         if threads > 1:
-            set_num_threads(min(threads, get_num_threads()))
+            use_threads(threads)
         run = _Run(request, Bed.from_cloud(request.cloud, request.scene, threads))
         run.resume()
         run.settle()
@@ -130,7 +131,7 @@ class _Run:
                 records, before = data["records"], float(data["spent"])
                 self.bed.restore({name: data[name] for name in data.files})
         except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
-            self.bed = Bed.from_cloud(self.request.cloud, self.request.scene, self.bed.threads)
+            self.bed = type(self.bed).from_cloud(self.request.cloud, self.request.scene, self.bed.threads)
             return
         self.records = [tuple(row) for row in records]
         self.before = before

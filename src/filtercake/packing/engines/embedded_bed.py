@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numba
 import numpy as np
 
 from filtercake.errors import EngineError
@@ -65,6 +66,15 @@ def _no_pairs(threads: int, capacity: int, frictional: bool) -> kernels.Pairs:
         near_constants=np.empty((capacity, 2)),
         near_pair=np.empty(capacity, dtype=np.uint32),
     )
+
+
+# of the thread pools, the one with the least cost per parallel part of a time step comes first
+numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
+
+
+def use_threads(count: int) -> None:
+    """Let the kernels take up to ``count`` threads."""
+    numba.set_num_threads(min(count, numba.get_num_threads()))
 
 
 class Bed:
@@ -177,6 +187,8 @@ class Bed:
             else:
                 own[...] = saved[name]
         self.pairs = kernels.Pairs(*(np.array(saved[f"pairs_{name}"]) for name in kernels.Pairs._fields))
+        if self.pairs.bounds.size != self.threads + 1:
+            raise ValueError("the state is of a bed with another number of threads")
         self.force[0] = saved["totals"][0]
         if self.frictional:
             self.torque[0] = saved["totals"][1]

@@ -12,8 +12,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
+from numba.misc.special import literally
 
+from filtercake.packing.compiled import cached_njit
 from filtercake.units import FloatArray, IntArray
 
 Unsigned = np.ndarray[Any, np.dtype[np.uint64]]
@@ -205,9 +207,7 @@ CLOSE_TO_LIMIT = 0.95
 FUSED = {"contract"}
 """Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
 
-_compiled = njit(cache=True, error_model="numpy", fastmath=FUSED)
-_inlined = njit(cache=True, error_model="numpy", fastmath=FUSED, forceinline=True)
-"""For what is told the kind of scene: inlined where the kind is a constant, it loses what this kind doesn't need."""
+_compiled = cached_njit(error_model="numpy", fastmath=FUSED)
 
 # indices are unsigned: signed ones cost a test for negative values at every access
 IMAGE_SHIFT = np.uint32(28)
@@ -219,13 +219,13 @@ SAME_IMAGE = np.uint32(4)
 STIFFNESS, DAMPING = range(2)
 
 
-@njit(cache=True, error_model="numpy")
+@cached_njit(error_model="numpy")
 def _layer(z: float, side: float, layers: int) -> int:
     """Layer of cells that a height lies in."""
     return min(max(int(z / side), 0), layers - 1)
 
 
-@njit(cache=True)
+@cached_njit
 def _by_cell(cell: IntArray, start: IntArray) -> IntArray:
     """Order by cell; ``start`` holds how many each cell has, one place further, and becomes each cell's first."""
     for c in range(start.size - 1):
@@ -238,7 +238,7 @@ def _by_cell(cell: IntArray, start: IntArray) -> IntArray:
     return order
 
 
-@njit(cache=True)
+@cached_njit
 def sort_into_cells(
     state: FloatArray, level: IntArray, cell_size: FloatArray, length: float, top: float
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
@@ -334,7 +334,7 @@ def _find_pairs(part: int, state: FloatArray, grid: Grid, skin: float, pairs: Pa
 def make_find_pairs(threaded: bool) -> Callable[..., int]:
     """Compile the search for pairs, for one thread or several."""
 
-    @njit(cache=True, parallel=threaded)
+    @cached_njit(parallel=threaded)
     def find_pairs(state: FloatArray, grid: Grid, skin: float, pairs: Pairs) -> int:
         """List in ``pairs`` those closer than ``skin``, each once, by sphere (spheres sorted into cells).
 
@@ -351,7 +351,7 @@ def make_find_pairs(threaded: bool) -> Callable[..., int]:
     return compiled
 
 
-@njit(cache=True)
+@cached_njit
 def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_ratio: float) -> None:
     """Fill each pair's constants."""
     first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
@@ -366,7 +366,7 @@ def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_rati
             constants[p, DAMPING] = damping * math.sqrt(2.0 * modulus * root * reduced)
 
 
-@njit(cache=True)
+@cached_njit
 def carry_springs(order: IntArray, old: Pairs, new: Pairs) -> None:
     """Carry tangential springs over to a new pair list; ``order[i]`` is where sphere i stood before, -1 if new."""
     old_first, old_last, old_neighbour, old_spring = old.first, old.last, old.neighbour, old.spring
@@ -478,14 +478,14 @@ def _limit_spring(
     return hx * ratio, hy * ratio, hz * ratio, True
 
 
-@njit(cache=True)
+@cached_njit
 def _share(part: int, bodies: Bodies) -> range:
     """Return the spheres that one thread moves."""
     parts, n = bodies.force.shape[0], bodies.state.shape[0]
     return range(part * n // parts, (part + 1) * n // parts)
 
 
-@njit(cache=True)
+@cached_njit
 def _clear(part: int, bodies: Bodies, gravity: float, frictional: bool) -> None:
     """Set one layer of the forces and torques to nothing but, in the first, the spheres' weight."""
     force, torque = bodies.force[part], bodies.torque[part]
@@ -496,7 +496,7 @@ def _clear(part: int, bodies: Bodies, gravity: float, frictional: bool) -> None:
             torque[i, 0] = torque[i, 1] = torque[i, 2] = 0.0
 
 
-@njit(cache=True)
+@cached_njit
 def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
     """Move the forces and torques on one part's spheres from the other layers to the first."""
     force, torque = bodies.force, bodies.torque
@@ -510,11 +510,12 @@ def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
                     torque[other, i, k] = 0.0
 
 
-@_inlined
+@_compiled
 def _pair_forces(
     part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, cohesive: bool, frictional: bool
 ) -> None:
     """Add the forces and torques of the pairs of one part's spheres to its layers."""
+    literally(cohesive), literally(frictional)  # compiled for each kind: what it doesn't need is not in its code
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[part], bodies.torque[part]
     last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
     spring, pair, length = pairs.spring, pairs.near_pair, law.length
@@ -595,9 +596,10 @@ def _pair_forces(
             torque[i, 2] += tz
 
 
-@_inlined
+@_compiled
 def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, cohesive: bool, frictional: bool) -> None:
     """Add the floor's forces and torques to the total."""
+    literally(cohesive), literally(frictional)
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     constants, spring, grounded = floor.constants, floor.spring, floor.grounded
     for k in range(grounded.size):
@@ -634,7 +636,7 @@ def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, co
             torque[i, 1] -= arm * px
 
 
-@_inlined
+@_compiled
 def _move(
     part: int, bodies: Bodies, patches: Patches, kick: float, frame_speed: float, law: Law, frictional: bool
 ) -> tuple[float, bool]:
@@ -643,6 +645,7 @@ def _move(
     ``kick`` is the time, s, that the force has acted. Returns the largest squared speed in the frame, and whether
     a sphere was faster than its patch may be.
     """
+    literally(frictional)
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     gravity, time_step = law.gravity, law.time_step
     fastest, too_fast = 0.0, False
@@ -669,7 +672,7 @@ def _move(
     return fastest, too_fast
 
 
-@njit(cache=True)
+@cached_njit
 def _disturbed(state: FloatArray, watched: IntArray) -> bool:
     """Whether one of the watched spheres was touched: until then it falls straight down, to the last bit."""
     disturbed = False
@@ -682,11 +685,11 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
-    The kind is all that is bound here: numba finds a function that binds compiled ones in no cache. A threaded loop
-    gives each thread a share of the pairs and a force buffer of its own.
+    A threaded loop gives each thread a share of the pairs and a force buffer of its own. It binds plain numbers
+    alone: a loop that binds compiled functions is in no other process's cache.
     """
 
-    @njit(cache=True, error_model="numpy", fastmath=FUSED, parallel=threaded)
+    @cached_njit(error_model="numpy", fastmath=FUSED, parallel=threaded)
     def advance(
         steps: int, moment: Moment, bodies: Bodies, floor: Floor, pairs: Pairs, listing: Listing, law: Law
     ) -> tuple[int, bool]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
 from filtercake.study.config.values import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText, ResidenceTime
 from filtercake.units import MICROMETRE
 
+LawSize = Annotated[float, Field(ge=0.01, le=10_000, allow_inf_nan=False), TO_NUMBER]
+LAW_TRUNCATION = 0.001
+"""Volume share under which a class of a distribution with tails is left out of the packing (paper section 3.1)."""
 TruncationSize = Annotated[float, Field(ge=0.001, le=100_000, allow_inf_nan=False), TO_NUMBER]
 
 
@@ -30,8 +33,29 @@ class SizeClass(Model):
     ]
 
 
+class Lognormal(Model):
+    """A lognormal distribution of the volume."""
+
+    d10_um: LawSize = Field(description="Size, um, that 10 % of the volume is smaller than.")
+    d50_um: LawSize = Field(description="Size, um, that half of the volume is smaller than; near sqrt(d10 d90).")
+    d90_um: LawSize = Field(description="Size, um, that 90 % of the volume is smaller than.")
+
+
+class RosinRammler(Model):
+    """A Rosin-Rammler distribution: exp(-(d/size_um)^exponent) of the volume is larger than d."""
+
+    size_um: LawSize = Field(description="Size, um, that 36.8 % of the volume is larger than.")
+    exponent: Annotated[float, Field(ge=0.1, le=100, allow_inf_nan=False), TO_NUMBER] = Field(
+        description="Exponent, above 2: with less the sum of x/d^2 has no end towards the fines."
+    )
+
+
+SOURCES = ("mixture", "file", "lognormal", "rosin_rammler", "residence_time_min")
+"""Keys that say where a distribution is from; each has exactly one."""
+
+
 class Csd(Model):
-    """A crystal size distribution: a mixture of discrete sizes, a CSV file, or the crystallizer's product."""
+    """A crystal size distribution: a mixture of sizes, a file, a law of few numbers, or the crystallizer's product."""
 
     label: Annotated[str, Field(max_length=60), TO_TEXT] | None = Field(
         default=None, description="Name in figures and tables; the key if left out."
@@ -41,14 +65,20 @@ class Csd(Model):
     )
     file: PathText | None = Field(
         default=None,
-        description="CSV with the columns size_um,volume_fraction; path relative to the study file.",
+        description="CSV with the columns size_um,volume_fraction, or as a spreadsheet or an instrument writes it; "
+        "path relative to the study file.",
+    )
+    lognormal: Lognormal | None = Field(default=None, description="Lognormal by volume, from d10_um, d50_um, d90_um.")
+    rosin_rammler: RosinRammler | None = Field(
+        default=None, description="Rosin-Rammler by volume, from size_um and exponent."
     )
     residence_time_min: ResidenceTime | None = Field(
         default=None, description="Product of the study's crystallizer at this residence time, min."
     )
     truncate_below_volume_fraction: Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER] = Field(
         default=0.0,
-        description="Classes below this volume share are left out of the packing (not of the resistance).",
+        description="Classes below this volume share are left out of the packing (not of the resistance); 0.001 for "
+        "lognormal and rosin_rammler if left out.",
     )
     truncate_below_um: TruncationSize | None = Field(
         default=None, description="Classes of smaller crystals than this, um, are left out of the packing likewise."
@@ -57,12 +87,27 @@ class Csd(Model):
         default=None, description="Classes of larger crystals than this, um, are left out of the packing likewise."
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_tails(cls, values: Any) -> Any:
+        of_law = isinstance(values, dict) and (values.get("lognormal") or values.get("rosin_rammler"))
+        return {"truncate_below_volume_fraction": LAW_TRUNCATION, **values} if of_law else values
+
     @model_validator(mode="after")
     def _one_source(self) -> Csd:
-        if [self.mixture, self.file, self.residence_time_min].count(None) != 2:
-            raise ValueError("needs exactly one of mixture, file and residence_time_min")
+        if sum(getattr(self, source) is not None for source in SOURCES) != 1:
+            raise ValueError(f"needs exactly one of {', '.join(SOURCES[:-1])} and {SOURCES[-1]}")
         _check_ends(self.truncate_below_um, self.truncate_above_um)
         return self
+
+    @property
+    def recipe(self) -> dict[str, list[Any]]:
+        """What :func:`filtercake.crystals.size_laws.made` takes: plain values, empty for a file or a crystallizer."""
+        if self.lognormal is not None:
+            return {"lognormal": list(self.lognormal.model_dump().values())}
+        if self.rosin_rammler is not None:
+            return {"rosin_rammler": list(self.rosin_rammler.model_dump().values())}
+        return {"classes": [[item.size_um, item.volume_fraction] for item in self.mixture or []]}
 
     @property
     def truncation(self) -> dict[str, float]:

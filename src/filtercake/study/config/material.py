@@ -32,6 +32,9 @@ class Material(Model):
     sphericity: Annotated[float, Field(ge=0.01, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
         default=1.0, description="Sphericity in the resistance law; packings are of spheres."
     )
+    trust_units: bool = Field(
+        default=False, description="Take density, sizes and measured resistances as they are, however unlikely."
+    )
 
     @property
     def density(self) -> float:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from filtercake.study import limits
 from filtercake.units import NUMBER
+from filtercake.user_files import as_written
 
 NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 """What a study or a distribution may be called: it names files and folders."""
@@ -64,6 +65,10 @@ def _listed(value: Any) -> Any:
 
 
 def _name(value: Any) -> Any:
+    """Take a name as it is written, also where YAML takes it for a number."""
+    value = as_written(value)
+    if value is None or isinstance(value, bool):
+        raise ValueError("is no text to YAML; if it is a name, write it in quotes")
     if not isinstance(value, str) or not NAME.match(value):
         raise ValueError("must be letters, digits, - and _, starting with a letter or digit, at most 64 long")
     return value
@@ -71,6 +76,7 @@ def _name(value: Any) -> Any:
 
 def _text(value: Any) -> Any:
     """Take away the blanks around a text; refuse what would break a line, a figure or a table that shows it."""
+    value = as_written(value)
     if not isinstance(value, str):
         return value
     text = value.strip()
@@ -85,6 +91,7 @@ def _text(value: Any) -> Any:
 
 def _path(value: Any) -> Any:
     """Refuse what no file is called, or Snakemake would not take as it is."""
+    value = as_written(value)
     if not isinstance(value, str):
         return value
     unseen = any(unicodedata.category(character) in UNSEEN for character in value)

@@ -14,12 +14,13 @@ from filtercake.validation.stability import OUTCOMES, SI_UNITS
 
 COLOURS = {
     "ok": "#009E73",
+    "undecided": "#999999",
     "inaccurate": "#E69F00",
     "unsettled": "#56B4E9",
     "exploded": "#D55E00",
     "refused": "#CC79A7",
 }
-SHAPES = {"ok": "o", "inaccurate": "^", "unsettled": "s", "exploded": "X", "refused": "D"}
+SHAPES = {"ok": "o", "undecided": "P", "inaccurate": "^", "unsettled": "s", "exploded": "X", "refused": "D"}
 NAMES = {
     "time_step": "Time step / Rayleigh step",
     "cohesion_kJ_m3": "Cohesion (kJ/m³)",

@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.result import publish
+from filtercake.results.tables import read_table
 from filtercake.run.job import Progress, job
 from filtercake.study import engine_choice
 from filtercake.study.loading import load_study
@@ -17,7 +16,7 @@ with job(snakemake.log[0], snakemake.output) as log:
     study = with_engine(load_study(Path(case["study"])), Embedded.name)
     table = coverage(
         base_point(study, case["csd"], engine_choice.choose, friction=case["friction"]).scene,
-        reference_of(pd.read_csv(snakemake.input.reference), case["reference"], case["friction"]),
+        reference_of(read_table(snakemake.input.reference), case["reference"], case["friction"]),
         snakemake.params.interval,
         snakemake.params.repeats,
         lambda line: (log.info(line), Progress().note(line)),

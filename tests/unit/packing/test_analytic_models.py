@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture, read_csd, truncate
-from filtercake.validation.analytic_models import PEERS, farr_groot, ouchiyama_tanaka, yu_zou_standish
+from filtercake.packing.analytic_models import PEERS, farr_groot, ouchiyama_tanaka, yu_zou_standish
 
 UM = 1e-6
 
