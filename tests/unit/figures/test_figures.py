@@ -523,7 +523,7 @@ def test_a_backend_that_is_not_there_changes_nothing(backend: str, room: str, tm
 import filtercake.{room}, os
 from pathlib import Path
 from matplotlib.figure import Figure
-from filtercake.figures.catalogue import save
+from filtercake.figures.style import save
 save(Figure(), Path("x.png"), Path("x.pdf"))
 assert os.environ["MPLBACKEND"] == {backend!r}
 """
