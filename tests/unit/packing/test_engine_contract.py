@@ -26,7 +26,7 @@ from filtercake.study.limits import refusals
 from filtercake.study.loading import LoadedStudy, load_study
 from filtercake.study.points import expand
 
-SCENE = "packing: {particles: 100, replicates: 1, engine: toy}\n"
+SCENE = "packing: {particles: 200, replicates: 1, engine: toy}\n"
 
 
 class Toy(Engine):
@@ -86,7 +86,7 @@ def test_it_is_estimated_from_its_own_cost(toy_scene: Scene, monkeypatch: pytest
     assert packing_seconds(toy_scene) == pytest.approx(usual * Toy.sphere_step[0] / Embedded.sphere_step[0])
     monkeypatch.setattr(Toy, "fixed_steps", 1000)
     assert fall_steps(toy_scene) == 1000
-    assert packing_seconds(toy_scene) == pytest.approx(1e-6 * 100 * 1000)
+    assert packing_seconds(toy_scene) == pytest.approx(1e-6 * 200 * 1000)
 
 
 def test_the_fence_knows_its_limit(toy_scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,7 +108,7 @@ def test_an_engine_with_a_box_of_its_own_takes_no_other(
 
 def test_it_packs_and_is_shown_by_its_name(tmp_path: Path) -> None:
     source = api.distribution(mixture={30: 0.5, 50: 0.5})
-    bed = api.pack(source, tmp_path / "bed", density_kg_m3=1180, particles=100, replicates=1, engine="toy")
+    bed = api.pack(source, tmp_path / "bed", density_kg_m3=1180, particles=200, replicates=1, engine="toy")
     assert (bed.failures, bed.summary["engine"]) == ((), "toy")
     assert api.porosity(bed.files[0]).engine == "toy"
     figure = Figure()
@@ -121,6 +121,6 @@ def test_its_input_is_exported(write_study: Callable[..., Path], good_study: str
     study, out = write_study(good_study + SCENE), tmp_path / "out"
     (point,) = expand(load_study(study), engine_choice.choose)
     assert main(["export", str(study), point.name, "--results", str(tmp_path), "--output", str(out)]) == 0
-    assert (out / "toy.txt").read_text() == "100 spheres"
+    assert (out / "toy.txt").read_text() == "200 spheres"
     text = (out / "README.md").read_text()
     assert "`toy toy.txt`" in text and "| `toy.txt` | what the engine reads |" in text
