@@ -42,7 +42,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
 $(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
-.PHONY: run report browser benchmark stability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin leaf-tests synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -149,6 +149,9 @@ agreement: setup ## both engines on the same clouds, nine cases (about 45 min on
 twin: setup ## twenty calibrations whose answer is known, with and without friction, and with a discrepancy (about 30 min on 2 cores)
 	$(SNAKEMAKE) twin
 	install -m 644 results/benchmark/twin_repeats.csv results/benchmark/twin_discrepancy.csv docs/data/
+
+leaf-tests: setup ## 200 synthetic filtration tests of each kind of fault: docs/data/leaf_tests.csv (about 2 min)
+	$(BIN)/python -m filtercake.validation.leaf_tests --output docs/data/leaf_tests.csv
 
 bed-size: setup ## several beds of N = 25 000 against one of N = 100 000, alum (about 10 min)
 	$(SNAKEMAKE) bed_size

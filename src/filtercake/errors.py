@@ -98,15 +98,26 @@ class EngineError(FiltercakeError):
     Attributes
     ----------
     transient : bool
-        True where the same packing may well succeed when tried again (killed, truncated output, time limit).
+        True where the same packing may well succeed when tried again at once (killed, truncated output).
+    may_pass : bool
+        True where another run may make it: a transient error, a program that is missing or another one, a time limit.
     outcome : {"refused", "exploded", "unsettled"}
         What became of the bed: the engine would not start it, it flew apart, or it did not come to rest in time.
     """
 
-    def __init__(self, message: str, *, transient: bool = False, outcome: str = "refused"):
+    def __init__(self, message: str, *, transient: bool = False, may_pass: bool = False, outcome: str = "refused"):
         super().__init__(message)
         self.transient = transient
+        self.may_pass = transient or may_pass
         self.outcome = outcome
+
+
+class TimeLimitReached(EngineError):  # noqa: N818
+    """A packing was stopped at its time limit: another try would be as long; its state, if it has one, is kept."""
+
+    def __init__(self, seconds: float):
+        text = f"time limit of {seconds:g} s reached; the packing was stopped (packing.time_limit_min)"
+        super().__init__(text, may_pass=True, outcome="unsettled")
 
 
 class EngineMissing(EngineError):  # noqa: N818 - reads better than EngineMissingError where it is caught
@@ -120,7 +131,7 @@ class PackingRejected(FiltercakeError):  # noqa: N818
     ----------
     reasons : tuple of str
         Every reason.
-    transient : bool
+    transient, may_pass : bool
         As for :class:`EngineError`.
     outcome : {"refused", "exploded", "unsettled"}
         As for :class:`EngineError`.
@@ -128,7 +139,7 @@ class PackingRejected(FiltercakeError):  # noqa: N818
 
     def __init__(self, reasons: Sequence[str], *, transient: bool = False, outcome: str = "refused"):
         self.reasons = tuple(reasons)
-        self.transient = transient
+        self.transient = self.may_pass = transient
         self.outcome = outcome
         super().__init__("; ".join(self.reasons))
 

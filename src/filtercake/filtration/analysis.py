@@ -38,7 +38,7 @@ WIDE: Final = 0.10
 """Half-width of the resistance's interval over its value from which it is said."""
 APART: Final = 2.0
 """Factor between the resistances of two choices that cannot both stand behind one number."""
-UNDECIDED: Final = 0.25
+UNDECIDED: Final = 0.1
 """Probability of choices ``APART`` from the answer from which a test is refused."""
 SAID: Final = 0.05
 """Probability from which a rival choice is mentioned, where it gives a resistance outside the answer's own interval."""

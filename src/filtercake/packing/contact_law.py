@@ -72,6 +72,14 @@ def pull_off_force(
     return 2.0 * math.pi**3 / 3.0 * cohesion**3 * radius**2 / modulus**2
 
 
+def cohesive_strength(cohesion: float, youngs_modulus: float, poisson_ratio: float) -> float:
+    """Stress that SJKR cohesion holds, Pa: pull-off of equal spheres over their diameter squared, whatever the size.
+
+    ``(pi^3 / 24) s^3 / E*^2``.
+    """
+    return math.pi**3 / 24.0 * cohesion**3 / effective_modulus(youngs_modulus, poisson_ratio) ** 2
+
+
 def cohesion_at_overlap(relative: float, youngs_modulus: float, poisson_ratio: float) -> float:
     """Cohesion energy density at which equal spheres overlap by ``relative`` of their diameter, J/m3."""
     modulus = effective_modulus(youngs_modulus, poisson_ratio)

@@ -250,12 +250,6 @@ def whole(manifest: Path) -> bool:
     return True
 
 
-def _may_pass(error: Exception) -> bool:
-    """Whether the program failed, not the packing."""
-    refused = isinstance(error, EngineError) and error.outcome == "refused"
-    return refused or bool(getattr(error, "transient", False))
-
-
 def _attempt(
     scene: Scene,
     replicate: int,
@@ -280,9 +274,10 @@ def _attempt(
                 progress(f"replicate {replicate}: {error}; trying again")
                 continue
             _keep_evidence(scratch, npz, engine.evidence)
-            if not getattr(error, "transient", False):  # what was stopped goes on from there when it is given more
+            may_pass = bool(getattr(error, "may_pass", False))
+            if not may_pass:  # what was stopped goes on from there when it is given more
                 state_file.unlink(missing_ok=True)
-            return Outcome(replicate, "failed", str(error), seed, "", attempt, _may_pass(error)), {}
+            return Outcome(replicate, "failed", str(error), seed, "", attempt, may_pass), {}
         record = {**made.diagnostics, "key": key, "attempts": attempt}
         checksum = Packing(made.position, made.radius, made.length, record).save(npz)
         _keep_pictures(scratch, npz)

@@ -36,6 +36,14 @@ class Representation:
     share: float
     porosity_shift: float
 
+    @property
+    def words(self) -> str:
+        """What is too rare, in words."""
+        if not self.merged:
+            return "whole numbers of spheres hold other shares of the size classes"
+        classes = "one size class holds" if self.merged == 1 else f"{self.merged} size classes hold"
+        return f"{classes} less than one sphere each ({self.share:.2%} of the volume)"
+
 
 def merge_rare(csd: CrystalSizeDistribution, particles: int) -> CrystalSizeDistribution:
     """Merge classes that would hold less than one sphere with their finer neighbours, coarsest first.

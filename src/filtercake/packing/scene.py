@@ -17,6 +17,9 @@ from filtercake.packing import contact_law
 from filtercake.packing.cloud import NARROW, PLACEMENT_HEIGHT, box_length
 from filtercake.units import GRAVITY
 
+SPREAD: Final = 0.0026
+"""Standard deviation of one packing's porosity at ``SPREAD_PARTICLES`` spheres."""
+SPREAD_PARTICLES: Final = 2000
 INCIDENTAL: Final = ("processes", "time_limit", "write_vtk")
 """What does not decide a packing: it stands whatever these become."""
 _KINDS: Final = {"int": (int,), "float": (int, float), "str": (str,), "bool": (bool,)}
@@ -151,6 +154,25 @@ class Scene:
     def relative_overlap(self) -> float:
         """Equilibrium overlap of equal spheres over their diameter."""
         return contact_law.relative_overlap(self.cohesion, self.youngs_modulus, self.poisson_ratio)
+
+    @property
+    def expected_spread(self) -> float:
+        """Standard deviation of one packing's porosity, roughly: it falls with the root of the number of spheres."""
+        return SPREAD * math.sqrt(SPREAD_PARTICLES / self.particles)
+
+    @property
+    def pull_off_over_weight(self) -> float:
+        """Pull-off force of two of the smallest spheres over the weight of one."""
+        radius = 0.5 * self.csd.smallest
+        force = contact_law.pull_off_force(self.cohesion, self.youngs_modulus, self.poisson_ratio, radius, radius)
+        return force / (self.density * 4.0 / 3.0 * math.pi * radius**3 * GRAVITY)
+
+    @property
+    def strength_over_load(self) -> float:
+        """Cohesive strength of the contacts over the solids stress half way down the bed."""
+        strength = contact_law.cohesive_strength(self.cohesion, self.youngs_modulus, self.poisson_ratio)
+        solids = self.particles * self.csd.mean_particle_volume
+        return strength / (0.5 * self.density * GRAVITY * solids / self.box_length**2)
 
     @property
     def is_wide(self) -> bool:

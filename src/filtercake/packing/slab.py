@@ -12,6 +12,8 @@ MARGIN_DIAMETERS = 1.0
 """Largest diameters left out at the floor and below the top."""
 SMALLEST_THICKNESS_DIAMETERS = 1.0
 """A slab thinner than this many largest diameters does not represent the bed."""
+LEAST_BED_DIAMETERS = 2.0 * MARGIN_DIAMETERS + SMALLEST_THICKNESS_DIAMETERS
+"""Depth of a bed that has such a slab, in largest diameters."""
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,7 @@ REPLICATE_COLUMNS = (
     *MEASURED,
     "porosity_from_floor",
     "soft_contact_compaction",
+    "pull_off_over_weight",
     "overlap_max",
     "coordination",
     "particles",
@@ -60,6 +61,7 @@ SUMMARY_COLUMNS = (
     "resistance_sauter_ci95_m_kg",
     "resistance_truncated_m_kg",
     "soft_contact_compaction",
+    "pull_off_over_weight",
     "overlap_max",
     "wall_s",
 )
@@ -86,6 +88,7 @@ def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, spheric
         "resistance_truncated_m_kg": kozeny_carman(found.interior, truncated, *law),
         "porosity_from_floor": found.from_floor,
         "soft_contact_compaction": found.compaction,
+        "pull_off_over_weight": point.scene.pull_off_over_weight,
         "overlap_max": record["overlap_max"],
         "coordination": record["coordination"],
         "particles": record["particles"],
@@ -143,7 +146,8 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
             row[column] = values.mean() if values.size else np.nan
             row[_interval_name(column)] = half_width(values)
         row["interval_reached"] = _reached(row["porosity_ci95"], row["porosity_ci95_target"])
-        row["soft_contact_compaction"] = good["soft_contact_compaction"].mean()
+        for column in ("soft_contact_compaction", "pull_off_over_weight"):
+            row[column] = good[column].mean()
         row["overlap_max"] = good["overlap_max"].max()
         rows.append(row)
     return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))

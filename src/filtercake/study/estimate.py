@@ -39,9 +39,6 @@ GROWTH: Final = 0.1
 """Exponent of the time per sphere in the number of spheres: less of a large bed is surface, and it needs more steps."""
 START_SECONDS: Final = 5.0
 """Seconds of a job before and after its packings: Python, compiled kernels from their cache, records."""
-SPREAD: Final = 0.0026
-"""Standard deviation of one packing's porosity at ``SPREAD_PARTICLES`` spheres."""
-SPREAD_PARTICLES: Final = 2000
 EXPECTED_FREEDOM: Final = 8
 """Degrees of freedom of an interval asked for, as it is once reached: about nine packings."""
 
@@ -131,8 +128,8 @@ def packings_of(point: Point) -> int:
     """Return the packings that a point is expected to need: those asked for, or those that its interval takes."""
     if point.porosity_ci95_target is None:
         return point.replicates
-    spread = SPREAD * math.sqrt(SPREAD_PARTICLES / point.scene.particles)
-    needed = math.ceil((quantile(EXPECTED_FREEDOM) * spread / point.porosity_ci95_target) ** 2)
+    half_width_of_one = quantile(EXPECTED_FREEDOM) * point.scene.expected_spread
+    needed = math.ceil((half_width_of_one / point.porosity_ci95_target) ** 2)
     return min(max(needed, LEAST_REPLICATES, point.replicates), point.most_replicates)
 
 

@@ -9,15 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
+
+import numpy as np
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing import contact_law
 from filtercake.packing.engines import kind_of
+from filtercake.packing.representation import Representation, particles_for, represent
 from filtercake.packing.scene import Scene
+from filtercake.packing.slab import LEAST_BED_DIAMETERS
 from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND
 
 PAGE: Final = "docs/stability.md"
+
+MOST_PARTICLES: Final = 2_000_000
+"""Spheres of a packing."""
 
 FRICTIONLESS_TIME_STEP: Final = 0.5
 """Default time step over the Rayleigh step at mu = 0."""
@@ -41,6 +49,12 @@ LARGEST_RELATIVE_OVERLAP: Final = 0.035
 """Contacts overlap by more than this share of the diameter: refused (SJKR turns the bed over, porosity falls)."""
 DOUBTFUL_RELATIVE_OVERLAP: Final = 0.01
 """Contacts overlap by more than this share of the diameter: warned."""
+LOOSEST: Final = 0.5
+"""Porosity that settled beds stay under: one that is too shallow even at this is refused before it is made."""
+SHIFT_SPREADS: Final = 2.0
+"""Change of the porosity by size classes that hold no whole sphere, over one packing's spread: refused above."""
+IDLE_LOAD_SHARE: Final = 0.1
+"""Cohesive strength over the bed's own load under which cohesion changes nothing that can be seen: warned."""
 LIGHTEST_SOLID: Final = 300.0
 """Density, kg/m3, under that of any solid that is filtered: another unit is meant."""
 SMALLEST_POROSITY, LARGEST_POROSITY = 0.15, 0.85
@@ -59,7 +73,7 @@ class Finding:
 
     Attributes
     ----------
-    key : {"cohesion", "time_step", "density", "restitution", "sizes"}
+    key : {"cohesion", "time_step", "density", "restitution", "sizes", "particles"}
         Which number it is about.
     text : str
         What is wrong, with the number that is allowed and the page that shows why.
@@ -105,6 +119,43 @@ def refusals(scene: Scene) -> Iterator[Finding]:
     if scene.restitution <= engine.least_restitution:
         text = f"{engine.label} takes only more than {engine.least_restitution:g}; use engine: auto ({PAGE})"
         yield Finding("restitution", text)
+    yield from _unfit_beds(scene)
+
+
+def _unfit_beds(scene: Scene) -> Iterator[Finding]:
+    """Say which beds are too small for their distribution: too shallow to measure, or short of whole classes."""
+    needed = LEAST_BED_DIAMETERS * scene.csd.largest
+    deepest = scene.particles * scene.csd.mean_particle_volume / scene.box_length**2 / (1.0 - LOOSEST)
+    if deepest < needed:
+        yield Finding(
+            "particles",
+            f"a bed at most {deepest / MICROMETRE:.4g} um deep, less than the {needed / MICROMETRE:.4g} um of "
+            f"{LEAST_BED_DIAMETERS:g} of its largest spheres; use more particles, or a larger bed_depth_factor",
+        )
+    if kind_of(scene.engine).own_spheres:
+        return
+    found, largest = representation(scene), SHIFT_SPREADS * scene.expected_spread
+    if abs(found.porosity_shift) > largest:
+        enough = particles_for(scene.csd, largest, MOST_PARTICLES)
+        cure = (
+            f"use at least {enough:,} particles" if enough else "leave out sizes (truncate_...), or use more particles"
+        )
+        yield Finding(
+            "particles",
+            f"{found.words}; the porosity would be off by about {found.porosity_shift:+.3f}, more than its interval "
+            f"could tell: {cure}",
+        )
+
+
+def representation(scene: Scene) -> Representation:
+    """Say what the spheres of a scene hold of its distribution."""
+    return _represented(scene.csd.size.tobytes(), scene.csd.volume_fraction.tobytes(), scene.particles)
+
+
+@lru_cache
+def _represented(size: bytes, volume_fraction: bytes, particles: int) -> Representation:
+    csd = CrystalSizeDistribution(np.frombuffer(size), np.frombuffer(volume_fraction))
+    return represent(csd, particles)
 
 
 def unit_problems(csd: CrystalSizeDistribution, density: float) -> Iterator[Finding]:
@@ -169,6 +220,20 @@ def doubts(scene: Scene) -> Iterator[Finding]:
     if scene.restitution > LARGE_RESTITUTION:
         yield Finding(
             "restitution", f"over {LARGE_RESTITUTION:g} beds hardly come to rest; raise packing.max_fall_times ({PAGE})"
+        )
+    if scene.cohesion > 0.0 and (scene.pull_off_over_weight < 1.0 or scene.strength_over_load < IDLE_LOAD_SHARE):
+        yield Finding(
+            "cohesion",
+            f"does nothing at E = {scene.youngs_modulus / MEGAPASCAL:g} MPa: its pull-off is "
+            f"{scene.pull_off_over_weight:.2g} times the weight of the smallest crystal, its strength "
+            f"{scene.strength_over_load:.2g} times the load of the bed",
+        )
+    if not kind_of(scene.engine).own_spheres and representation(scene).merged:
+        found = representation(scene)
+        yield Finding(
+            "particles",
+            f"{found.words}; they are merged with their neighbours, and the porosity moves by about "
+            f"{found.porosity_shift:+.4f}",
         )
 
 

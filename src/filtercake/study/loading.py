@@ -386,6 +386,7 @@ def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str
                 "time_step": _time_step_key(model.packing, scene.rayleigh_fraction),
                 "restitution": where["restitution"],
                 "density": ("material.density_kg_m3", model.material.density),
+                "particles": ("packing.particles", float(scene.particles)),
             }
             yield keys, scene
 

@@ -57,7 +57,7 @@ def test_right_units_pass(tmp_path: Path) -> None:
         ("kPa: 70", "kPa: 0.7", "0.889", "is pressure_drop_kPa in bar? (70 gives 0.346)"),
         ("kPa: 70", "kPa: 0.07", "0.985", "is pressure_drop_kPa in MPa? (70 gives 0.346)"),
         ("mPa_s: 1", "mPa_s: 0.001", "0.0393", "is viscosity_mPa_s in Pa s? (1 gives 0.346)"),
-        ("cm2: 50", "cm2: 0.005", "0.99999983", "is area_cm2 in m2? (50 gives 0.346)"),
+        ("cm2: 50", "cm2: 0.005", "0.99999984", "is area_cm2 in m2? (50 gives 0.346)"),
         ("cm2: 50", "cm2: 5000", "0.0184", "is area_cm2 in mm2? (50 gives 0.346)"),
         ("kg_m3: 100", "kg_m3: 0.1", "0.0393", "is solids_per_filtrate_kg_m3 in g/mL (kg/L)? (100 gives 0.346)"),
     ],

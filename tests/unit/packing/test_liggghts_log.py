@@ -252,6 +252,14 @@ def test_every_bad_end_is_an_error_in_words(status: int, text: str, says: str, t
     assert caught.value.transient is transient
 
 
+def test_an_error_in_the_input_stays_one_and_another_program_may_be_replaced() -> None:
+    banner = "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, compiled 2020)\n"
+    for text, may_pass in ((banner, False), ("LAMMPS (2 Aug 2023)\n", True)):
+        with pytest.raises(EngineError) as caught:
+            check_end(1, parse_log(text + "run 5\nERROR: Unknown command: rum\n"))
+        assert (caught.value.transient, caught.value.may_pass) == (False, may_pass)
+
+
 # --- dumps ---------------------------------------------------------------------------------------------------------
 
 HEADER = "ITEM: TIMESTEP\n800\nITEM: NUMBER OF ATOMS\n{n}\nITEM: BOX BOUNDS pp pp ff\n0 140\n0 140\n-25 300\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from filtercake.crystals.csd import mixture
-from filtercake.errors import EngineError, PackingRejected
+from filtercake.errors import EngineError, PackingRejected, TimeLimitReached
 from filtercake.packing import pack as pack_module
 from filtercake.packing.pack import ATTEMPTS, Outcome, pack_replicates
 from filtercake.packing.scene import Scene
@@ -41,7 +41,9 @@ def made(monkeypatch: pytest.MonkeyPatch, folder: Path, error: Exception) -> Out
     ("error", "attempts", "may_pass"),
     [
         (EngineError("killed", transient=True, outcome="exploded"), ATTEMPTS, True),
-        (EngineError("Unknown command"), 1, True),
+        (EngineError("Unknown command"), 1, False),
+        (EngineError("cannot be started", may_pass=True), 1, True),
+        (TimeLimitReached(60.0), 1, True),
         (EngineError("the bed exploded", outcome="exploded"), 1, False),
         (PackingRejected(["still moving"], outcome="unsettled"), 1, False),
         (PackingRejected(["not finite"], transient=True, outcome="exploded"), ATTEMPTS, True),

@@ -102,3 +102,50 @@ def test_soft_contacts_are_warned_about() -> None:
     assert finding.key == "cohesion"
     assert "1.8% of the diameter" in finding.text  # (150/50)^2 * 0.205 %
     assert limits.verdict(scene) == "warned"
+
+
+def findings(scene: Scene, key: str) -> tuple[list[str], list[str]]:
+    """What is refused and what is warned about one number of a scene."""
+    return tuple([item.text for item in kind(scene) if item.key == key] for kind in (limits.refusals, limits.doubts))  # type: ignore[return-value]
+
+
+def test_a_large_crystal_that_no_sphere_stands_for_is_refused() -> None:
+    wide = replace(SCENE, csd=mixture([5e-6, 100e-6], [0.5, 0.5]), bed_depth_factor=2.0)
+    refused, _ = findings(wide.with_time_step(0.5), "particles")
+    words = next(text for text in refused if "one size class" in text)
+    assert "holds less than one sphere each (50.00% of the volume)" in words
+    assert "off by about +0.127" in words
+    assert "use at least 8,00" in words
+    assert limits.verdict(wide) == "refused"
+    # of the paper's own protocol, the engine draws the spheres
+    assert not any(
+        "size class" in text for text in findings(replace(wide, engine="liggghts_as_published"), "particles")[0]
+    )
+
+
+def test_rare_classes_that_change_nothing_are_merged_with_a_word() -> None:
+    rare = replace(SCENE, csd=mixture([20e-6, 50e-6, 60e-6], [0.5, 0.4995, 0.0005]))
+    assert limits.representation(rare).merged == 1
+    refused, warned = findings(rare, "particles")
+    assert not refused
+    assert len(warned) == 1
+    assert "less than one sphere each (0.05% of the volume); they are merged" in warned[0]
+
+
+def test_a_bed_too_shallow_for_its_slab_is_refused_before_it_is_made() -> None:
+    few = replace(SCENE, particles=100)
+    assert "less than the 150 um of 3 of its largest spheres; use more particles" in findings(few, "particles")[0][0]
+    assert not findings(replace(few, particles=1000), "particles")[0]
+    assert not findings(replace(few, particles=300, bed_depth_factor=3.0), "particles")[0]
+
+
+def test_a_cohesion_that_does_nothing_is_warned_about() -> None:
+    """The pull-off falls with E^2: at the modulus of the real crystal, 50 kJ/m3 holds no crystal."""
+    stiff = replace(SCENE, youngs_modulus=3e9).with_time_step(0.5)
+    assert stiff.pull_off_over_weight == pytest.approx(SCENE.pull_off_over_weight / 600.0**2, rel=1e-12)
+    text = findings(stiff, "cohesion")[1][0]
+    assert "does nothing at E = 3000 MPa: its pull-off is 0.00055 times the weight of the smallest crystal" in text
+    assert not findings(replace(stiff, cohesion=0.0), "cohesion")[1]
+    assert not findings(replace(SCENE, cohesion=10e3), "cohesion")[1]
+    # 24 Pa at 50 kJ/m3 and 5 MPa, whatever the size, on about 1 Pa of solids
+    assert 15.0 < SCENE.strength_over_load < 30.0

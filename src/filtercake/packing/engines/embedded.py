@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from filtercake import __version__
-from filtercake.errors import EngineError
+from filtercake.errors import EngineError, TimeLimitReached
 from filtercake.packing.engines.base import Engine, SettleRequest, parallelism
 from filtercake.packing.pictures import write_vtk
 from filtercake.packing.result import SettledState, publish
@@ -87,7 +87,9 @@ class _Run:
         Raises
         ------
         EngineError
-            If the bed explodes, or at the time limit (transient: the saved state lets it go on).
+            If the bed explodes.
+        TimeLimitReached
+            At the time limit; the saved state lets it go on.
         """
         rule, scene = self.request.rule, self.request.scene
         while len(self.records) <= rule.max_checks and rule.settled_at(self.trajectory()) is None:
@@ -105,8 +107,7 @@ class _Run:
             now = time.monotonic()
             if 0.0 < scene.time_limit < now - self.started:
                 self._save()
-                limit = f"time limit of {scene.time_limit:g} s reached; the packing was stopped"
-                raise EngineError(limit, transient=True, outcome="unsettled")
+                raise TimeLimitReached(scene.time_limit)
             if now - self.saved > STATE_SECONDS:
                 self._save()
             if now - self.reported > PROGRESS_SECONDS:

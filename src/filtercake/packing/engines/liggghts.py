@@ -15,7 +15,7 @@ from filtercake.errors import EngineError, EngineMissing
 from filtercake.packing.cloud import Cloud
 from filtercake.packing.engines import micro, process
 from filtercake.packing.engines.base import Engine, SettleRequest, parallelism
-from filtercake.packing.engines.liggghts_log import LiggghtsLog, parse_log, trajectory
+from filtercake.packing.engines.liggghts_log import UNKNOWN_VERSION, LiggghtsLog, parse_log, trajectory
 from filtercake.packing.engines.micro import UnitSystem
 from filtercake.packing.result import SettledState
 from filtercake.packing.scene import Scene
@@ -321,7 +321,9 @@ def check_end(status: int, log: LiggghtsLog) -> None:
     """
     if log.error is not None:
         blown = any(word in log.error for word in _BLOWN_UP)
-        raise EngineError(f"LIGGGHTS: {log.error}", outcome="exploded" if blown else "refused")
+        # of a program that is not LIGGGHTS another installation may make the packing; an error in the input stays one
+        another = log.version == UNKNOWN_VERSION
+        raise EngineError(f"LIGGGHTS: {log.error}", may_pass=another, outcome="exploded" if blown else "refused")
     if status < 0:
         # a bed that flies apart may end in a crash as well
         raise EngineError(f"LIGGGHTS was killed by signal {-status}", transient=True, outcome="exploded")

@@ -10,6 +10,8 @@ import numpy as np
 from filtercake.packing.engines.micro import MICRO, UnitSystem
 from filtercake.packing.settling import Trajectory
 
+UNKNOWN_VERSION = "unknown"
+"""Version of a program that does not say it is LIGGGHTS."""
 _VERSION = re.compile(r"^LIGGGHTS \(Version (?P<version>.*?)(?:, compiled|\))")
 _ERROR = re.compile(r"^ERROR(?: on proc \d+)?: (?P<text>.*)")
 _WARNING = re.compile(r"^WARNING(?: on proc \d+)?: *(?P<text>\S.*)")
@@ -59,7 +61,7 @@ class LiggghtsLog:
 
 def parse_log(text: str) -> LiggghtsLog:
     """Parse LIGGGHTS's screen output (made with ``-echo screen``)."""
-    version, error, last_line, previous = "unknown", None, "", ""
+    version, error, last_line, previous = UNKNOWN_VERSION, None, "", ""
     warnings: list[str] = []
     states: list[list[float]] = []
     dangerous, inserted, finished, forced = 0, None, None, False

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from filtercake.errors import EngineError
+from filtercake.errors import EngineError, TimeLimitReached
 
 POLL_SECONDS = 0.1
 GRACE_SECONDS = 5.0
@@ -50,7 +50,9 @@ def run(
     Raises
     ------
     EngineError
-        If the program cannot be started, or the time limit is reached (transient).
+        If the program cannot be started.
+    TimeLimitReached
+        At the time limit.
     """
     # ranks that wait must yield: two of them on one core would otherwise hardly advance
     environment = {"OMPI_MCA_mpi_yield_when_idle": "1", **os.environ, "OMP_NUM_THREADS": "1"}
@@ -69,7 +71,7 @@ def run(
                 preexec_fn=_die_with_parent if sys.platform == "linux" else None,
             )
         except OSError as error:
-            raise EngineError(f"{command[0]} cannot be started: {error.strerror}") from None
+            raise EngineError(f"{command[0]} cannot be started: {error.strerror}", may_pass=True) from None
         try:
             return _wait(process, time_limit, on_poll)
         finally:
@@ -86,9 +88,7 @@ def _wait(process: subprocess.Popen[bytes], time_limit: float, on_poll: Callable
         if on_poll is not None:
             on_poll()
         if deadline is not None and time.monotonic() > deadline:
-            raise EngineError(
-                f"time limit of {time_limit:g} s reached; the packing was stopped", transient=True, outcome="unsettled"
-            )
+            raise TimeLimitReached(time_limit)
 
 
 def _kill_group(process: subprocess.Popen[bytes]) -> None:

@@ -32,7 +32,7 @@ LONGEST_NAME = 255
 
 MOST_POINTS = 10_000
 """Points of a study; each is a job of its own."""
-MOST_PARTICLES = 2_000_000
+MOST_PARTICLES = limits.MOST_PARTICLES
 """Spheres of a packing."""
 MOST_VALUES = 1000
 """Entries of a list."""
