@@ -111,7 +111,6 @@ rule repeat_calibrations:
 rule calibrate_apart:
     input:
         packings="{results}/twin_discrepancy/replicates.csv",
-        library=library("validation.twin"),
     output:
         "{results}/benchmark/twin_discrepancy.csv",
     log:
@@ -124,6 +123,7 @@ rule calibrate_apart:
         mem_mb=1000,
         runtime=10,
     params:
+        library=library("validation.twin"),
         repeats=20,
         tests=4,
         noise=0.05,

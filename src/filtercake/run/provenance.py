@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.metadata
 import inspect
 import platform
@@ -22,6 +21,10 @@ from filtercake.packing.scene import digest
 ROOT = Path(__file__).resolve().parents[1]
 IMPORT = re.compile(r"^ *(?:from (filtercake[\w.]*) import (\([^)]*\)|.*)|import (filtercake\.[\w.]+))", re.MULTILINE)
 """Statements that import from the package, as ruff formats them."""
+STRING_OR_COMMENT = re.compile(
+    r'''("""(?:\\.|[^\\])*?"""|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')|#[^\n]*''', re.DOTALL
+)
+"""Strings (the group) and comments of Python, as ruff formats them."""
 PACKAGES = ("numpy", "scipy", "pandas", "numba", "matplotlib", "scikit-learn", "jinja2", "pydantic", "snakemake")
 
 
@@ -98,22 +101,22 @@ def code_hash(files: Iterable[Path]) -> str:
 
 @cache
 def _meaning(source: str) -> str:
-    """Hash the syntax tree of Python source, without the strings that stand alone: they do nothing."""
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        for name in ("body", "orelse", "finalbody"):
-            block = getattr(node, name, None)
-            if isinstance(block, list):
-                setattr(node, name, [statement for statement in block if not _is_text(statement)])
-    return digest(ast.dump(tree, annotate_fields=False))
+    """Hash Python source without comments, blank lines and strings that stand alone as statements.
 
+    The text is searched, as parsing it would slow every start; in doubt, a string is kept.
+    """
+    bare = STRING_OR_COMMENT.sub(lambda found: found[1] or "", source)
 
-def _is_text(statement: ast.AST) -> bool:
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
+    def shown(found: re.Match[str]) -> str:
+        before, _, indent = bare[: found.start()].rpartition("\n")
+        after = bare[found.end() :].partition("\n")[0]
+        ends_statement = not before.rstrip().endswith((*"([{,=+-*/%|&\\\"'",))
+        if found[0].startswith('"""') and ends_statement and not (indent + after).strip():
+            return ""
+        return repr(found[0]) if "\n" in found[0] else found[0]
+
+    text = STRING_OR_COMMENT.sub(shown, bare)
+    return digest([line.rstrip() for line in text.splitlines() if line.strip()])
 
 
 def versions() -> dict[str, str]:

@@ -130,20 +130,50 @@ def test_a_hash_follows_contents_not_places(tmp_path: Path) -> None:
 
 def test_a_hash_is_of_what_code_means(tmp_path: Path) -> None:
     file = tmp_path / "a.py"
-    plain = "def f(x):\n    y = x\n    return y\n"
+    plain = 'A = "# 1"\n\n\ndef f(x):\n    return g(\n        x,\n        """a\n\n  b""",\n    )\n'
     file.write_text(plain, encoding="utf-8")
     first = code_hash([file])
     for same in (
-        "# why\n" + plain,
-        '"""What."""\n\n\n' + plain,
-        plain.replace("    y", '    """Say."""\n    y'),
-        plain.replace("y = x", "y = (\n        x  # here\n    )"),
+        "# it's why\n" + plain,
+        '"""What\'s "done".\n\n# so\n"""\n\n\n' + plain,
+        plain.replace("    return", '    """Say."""\n\n    return'),
+        plain.replace("x,", "x,  # here"),
+        plain + '\nB: int\n"""It."""\n'.replace("B: int\n", ""),
     ):
         file.write_text(same, encoding="utf-8")
-        assert code_hash([file]) == first
-    for other in (plain.replace("return y", "return x"), plain + "F = 1\n", plain.replace("x", "z")):
+        assert code_hash([file]) == first, same
+    for other in ("# 2", "a\n\n b", "a\n  b", "z"):
+        old = {"# 2": "# 1", "z": "g("}.get(other, "a\n\n  b")
+        file.write_text(plain.replace(old, other), encoding="utf-8")
+        assert code_hash([file]) != first, other
+
+
+def meaning_by_syntax(source: str) -> str:
+    """What a hash should be of, by the parser: slower, and sure."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(getattr(node, "body", None), list):
+            text = [n for n in node.body if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)]
+            node.body = [n for n in node.body if n not in text]
+    return ast.dump(tree)
+
+
+@pytest.mark.filterwarnings("ignore:invalid escape")
+@pytest.mark.parametrize("path", sorted(ROOT.rglob("*.py")), ids=lambda path: path.name)
+def test_every_string_that_does_something_is_in_the_hash(path: Path, tmp_path: Path) -> None:
+    """Change one string after another: the hash follows where the syntax tree does, and only there."""
+    source, file = path.read_text(encoding="utf-8"), tmp_path / "a.py"
+    file.write_text(source, encoding="utf-8")
+    first, tree = code_hash([file]), meaning_by_syntax(source)
+    strings = [found for found in provenance.STRING_OR_COMMENT.finditer(source) if len(found[0]) > 8]
+    for found in strings[:: max(1, len(strings) // 10)]:
+        other = f"{source[: found.end() - 4]}X{source[found.end() - 4 :]}"
         file.write_text(other, encoding="utf-8")
-        assert code_hash([file]) != first
+        try:
+            does_something = meaning_by_syntax(other) != tree
+        except SyntaxError:
+            continue  # cut through an escape or a replacement field
+        assert (code_hash([file]) != first) >= does_something, found[0]
 
 
 def test_versions_name_every_package_even_a_missing_one(monkeypatch: pytest.MonkeyPatch) -> None:
