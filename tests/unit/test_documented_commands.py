@@ -369,7 +369,8 @@ def test_the_page_of_the_command_line_shows_every_command() -> None:
 
 
 def test_the_examples_in_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shutil.copytree(REPOSITORY / "config" / "test", tmp_path / "config" / "test")
+    for part in ("test", "measurements"):
+        shutil.copytree(REPOSITORY / "config" / part, tmp_path / "config" / part)
     monkeypatch.chdir(tmp_path)
     tiny = "config/test/tiny.yaml"
     point = expand(load_study(Path(tiny)), engine_choice.choose)[0].name
