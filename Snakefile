@@ -24,6 +24,7 @@ include: "workflow/rules/report.smk"
 
 if validation_is_asked():
 
+    include: "workflow/rules/common_validation.smk"
     include: "workflow/rules/validation.smk"
 
 

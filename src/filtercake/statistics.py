@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
 
 from filtercake.units import FloatArray
 
@@ -40,7 +40,7 @@ def quantile(freedom: float = math.inf, confidence: float = CONFIDENCE) -> float
     confidence : float
         Confidence level.
     """
-    return float(special.stdtrit(freedom, 0.5 + 0.5 * confidence)) if freedom > 0.0 else math.nan
+    return float(scipy.special.stdtrit(freedom, 0.5 + 0.5 * confidence)) if freedom > 0.0 else math.nan
 
 
 def likelihood_limit(freedom: float = math.inf) -> float:

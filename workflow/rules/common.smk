@@ -346,9 +346,3 @@ def validation_is_asked():
     keys = tuple(f"{key}=" for key in type(settings).model_fields)
     targets = [word for word in words if not word.startswith(keys)]
     return any(name in target for target in targets for name in names)
-
-
-def bed_size_tables(wildcards):
-    if bed_size_problem:
-        raise WorkflowError(f"bed_size cannot start:\n{bed_size_problem}")
-    return [f"{RESULTS}/{name}/replicates.csv" for name in BED_SIZES]

@@ -372,11 +372,6 @@ DATA = ROOT / "docs" / "data"
 PAGE_FOLDER = f"{re.escape(BENCHMARK)}|{re.escape(REDRAWN)}"
 
 
-def tables_of_page(committed, made):
-    """Tables behind a page: this run's, or the committed ones where it is only drawn again."""
-    return lambda wildcards: committed if wildcards.folder == REDRAWN else made
-
-
 rule redraw:
     input:
         f"{REDRAWN}/benchmark.md",

@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-from scipy import special
 
 from filtercake.units import FloatArray
 
@@ -85,7 +84,7 @@ def scatter(values: ArrayLike, errors: ArrayLike) -> float:
 
 def improbable(chi_square: float, degrees_of_freedom: int) -> bool:
     """Whether errors alone would give so large a sum of squares only with the probability ``MISFIT`` or less."""
-    return degrees_of_freedom > 0 and bool(special.chdtrc(degrees_of_freedom, chi_square) < MISFIT)
+    return degrees_of_freedom > 0 and bool(scipy.special.chdtrc(degrees_of_freedom, chi_square) < MISFIT)
 
 
 def chi_square(values: ArrayLike, errors: ArrayLike) -> float:

@@ -12,17 +12,16 @@ def _import_matplotlib() -> None:
 
     Figures are drawn without a backend; the one that was named is kept where matplotlib knows it.
     """
-    if "matplotlib" in sys.modules:
-        return
-    named = os.environ.pop("MPLBACKEND", None)
+    if "matplotlib" in sys.modules or "MPLBACKEND" not in os.environ:
+        return  # who plans a study does not wait for it
+    named = os.environ.pop("MPLBACKEND")
     import matplotlib
 
-    if named is not None:
-        os.environ["MPLBACKEND"] = named
-        try:
-            matplotlib.rcParams["backend"] = named
-        except ValueError:
-            return
+    os.environ["MPLBACKEND"] = named
+    try:
+        matplotlib.rcParams["backend"] = named
+    except ValueError:
+        return
 
 
 _import_matplotlib()

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy import special
+import scipy
 
 from filtercake.errors import FiltrationError
 from filtercake.filtration.constant_pressure import (
@@ -190,7 +190,7 @@ def _half_width(value: float, weight: FloatArray, fits: Sequence[FiltrationFit],
         lower, upper = low, high
         for _ in range(_HALVINGS):
             middle = 0.5 * (lower + upper)
-            below = float(weight @ special.stdtr(freedom, (middle - centre) / error)) < probability
+            below = float(weight @ scipy.special.stdtr(freedom, (middle - centre) / error)) < probability
             lower, upper = (middle, upper) if below else (lower, middle)
         return 0.5 * (lower + upper)
 
