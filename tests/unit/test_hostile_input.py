@@ -166,7 +166,8 @@ def test_a_distribution_too_broad_for_any_bed_is_refused(
     )
     with pytest.raises(ConfigError, match=r"csds.bimodal.mixture = 2 classes: needs .* spheres"):
         study_from(broad)
-    assert study_from(broad.replace("sweeps:", "packing: {particles: 5000}\nsweeps:"))
+    with pytest.raises(ConfigError, match=r"packing.particles = 5000: a bed at most 547.6 um deep, less than the"):
+        study_from(broad.replace("sweeps:", "packing: {particles: 5000}\nsweeps:"))
 
 
 def test_a_uselessly_short_time_step_is_refused(study_from: Callable[..., LoadedStudy], good_study: str) -> None:

@@ -225,7 +225,7 @@ def distribution(**options: Any) -> Distribution:
     """
     options = {name: value for name, value in options.items() if value is not None}
     material = {"trust_units": True, **({} if "kinetics" in options else {"density_kg_m3": PLAIN_DENSITY})}
-    study = load(options, material, {"particles": NARROW_PARTICLES})
+    study = load(options, material, {"particles": NARROW_PARTICLES}, packed=False)
     return _distribution(study, options)
 
 
@@ -361,7 +361,9 @@ def load_packing(npz: Path) -> tuple[Packing, Scene]:
     return packing, scene
 
 
-def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mapping[str, Any]) -> LoadedStudy:
+def load(
+    source: Mapping[str, Any], material: Mapping[str, Any], packing: Mapping[str, Any], *, packed: bool = True
+) -> LoadedStudy:
     """Check a study of one point: the arguments of :func:`distribution`, and the blocks ``material`` and ``packing``.
 
     Raises
@@ -383,7 +385,7 @@ def load(source: Mapping[str, Any], material: Mapping[str, Any], packing: Mappin
         study["sweeps"] = [{"csd": [CSD]}]
     with np.errstate(all="ignore"):
         try:
-            loaded = check_study(study, ORIGIN)
+            loaded = check_study(study, ORIGIN, packed=packed)
         except (ZeroDivisionError, OverflowError):
             raise ConfigError([_problem("options", "", OUT_OF_REACH)]) from None
         _check_sums(loaded)

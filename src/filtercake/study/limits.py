@@ -119,11 +119,10 @@ def refusals(scene: Scene) -> Iterator[Finding]:
     if scene.restitution <= engine.least_restitution:
         text = f"{engine.label} takes only more than {engine.least_restitution:g}; use engine: auto ({PAGE})"
         yield Finding("restitution", text)
-    yield from _unfit_beds(scene)
 
 
-def _unfit_beds(scene: Scene) -> Iterator[Finding]:
-    """Say which beds are too small for their distribution: too shallow to measure, or short of whole classes."""
+def small_beds(scene: Scene) -> Iterator[Finding]:
+    """Say whether a bed is too small for its distribution: too shallow to measure, or short of whole classes."""
     needed = LEAST_BED_DIAMETERS * scene.csd.largest
     deepest = scene.particles * scene.csd.mean_particle_volume / scene.box_length**2 / (1.0 - LOOSEST)
     if deepest < needed:
@@ -145,6 +144,14 @@ def _unfit_beds(scene: Scene) -> Iterator[Finding]:
             f"{found.words}; the porosity would be off by about {found.porosity_shift:+.3f}, more than its interval "
             f"could tell: {cure}",
         )
+
+
+def merged_classes(scene: Scene) -> Iterator[Finding]:
+    """Say which size classes the cloud merges because they are too rare."""
+    found = representation(scene)
+    if found.merged and not kind_of(scene.engine).own_spheres:
+        text = "they are merged with their neighbours, and the porosity moves by about"
+        yield Finding("particles", f"{found.words}; {text} {found.porosity_shift:+.4f}")
 
 
 def representation(scene: Scene) -> Representation:
@@ -227,13 +234,6 @@ def doubts(scene: Scene) -> Iterator[Finding]:
             f"does nothing at E = {scene.youngs_modulus / MEGAPASCAL:g} MPa: its pull-off is "
             f"{scene.pull_off_over_weight:.2g} times the weight of the smallest crystal, its strength "
             f"{scene.strength_over_load:.2g} times the load of the bed",
-        )
-    if not kind_of(scene.engine).own_spheres and representation(scene).merged:
-        found = representation(scene)
-        yield Finding(
-            "particles",
-            f"{found.words}; they are merged with their neighbours, and the porosity moves by about "
-            f"{found.porosity_shift:+.4f}",
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
@@ -195,8 +195,10 @@ def load_study(path: Path) -> LoadedStudy:
     return check_study(read_yaml(path), path)
 
 
-def check_study(values: Any, path: Path) -> LoadedStudy:
+def check_study(values: Any, path: Path, *, packed: bool = True) -> LoadedStudy:
     """Check a study's values, however they were given; the path is for messages and for the files they name.
+
+    Without ``packed``, no bed need be large enough for its distribution: it is only looked at.
 
     Raises
     ------
@@ -216,11 +218,15 @@ def check_study(values: Any, path: Path) -> LoadedStudy:
         except (CsdError, CrystallizerError) as error:
             problems.append(Problem(str(path), *_source_of(name, csd), str(error)))
     problems += _unit_problems(model, csds, str(path))
-    problems += _stability_problems(model, csds, str(path))
+    problems += _findings(model, csds, str(path), limits.refusals)
     problems += _bed_problems(model, csds, str(path))
+    if packed and not problems:
+        problems += _findings(model, csds, str(path), limits.small_beds)
     if problems:
         raise ConfigError(problems)
-    return LoadedStudy(path.stem, path, model, csds, (*remarks, *_doubts(model, csds, str(path))))
+    doubts = [*_findings(model, csds, str(path), limits.doubts)]
+    doubts += _findings(model, csds, str(path), limits.merged_classes) if packed else []
+    return LoadedStudy(path.stem, path, model, csds, (*remarks, *map(str, doubts)))
 
 
 def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
@@ -418,22 +424,13 @@ def _unit_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Itera
     return found.values()
 
 
-def _stability_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> list[Problem]:
-    """Scenes outside the fence, one problem per key."""
+def _findings(
+    model: Study, csds: dict[str, LoadedCsd], file: str, check: Callable[[Scene], Iterable[limits.Finding]]
+) -> list[Problem]:
+    """List what a check of the fence finds about all scenes, one problem per key."""
     found: dict[str, Problem] = {}
     for keys, scene in _scenes(model, csds):
-        for finding in limits.refusals(scene):
+        for finding in check(scene):
             key, value = keys[finding.key]
             found.setdefault(key, Problem(file, key, f"{value:g}", finding.text))
     return list(found.values())
-
-
-def _doubts(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterable[str]:
-    """Warnings: allowed, but the answer depends on a choice of numbers."""
-    seen = set()
-    for keys, scene in _scenes(model, csds):
-        for finding in limits.doubts(scene):
-            key, value = keys[finding.key]
-            if key not in seen:
-                seen.add(key)
-                yield f"{file}: {key} = {value:g}: {finding.text}"

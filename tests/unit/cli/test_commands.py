@@ -274,7 +274,8 @@ def test_pack_refuses_in_one_line(extra: list[str], said: str, tmp_path: Path, c
 
 
 def test_a_bed_that_fails_has_a_reason_and_status_1(tmp_path: Path, capsys: Capture) -> None:
-    few = ["pack", "--mixture", "20:0.01,200:0.99", "--density-kg-m3", "1180", "--particles", "50"]
+    few = ["pack", "--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200"]
+    few += ["--friction", "0.3", "--cohesion-kJ-m3", "0", "--max-fall-times", "1"]
     assert main([*few, "--engine", "embedded", "--replicates", "1", "--output", str(tmp_path / "x"), "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["n"], found["n_failed"], found["porosity"]) == (0, 1, None)

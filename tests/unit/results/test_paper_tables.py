@@ -118,7 +118,7 @@ def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> No
             row = {**point.row(), "status": "ok", "porosity": porosity, "porosity_paper_count": porosity}
             rows.append({**row, "resistance_m_kg": alpha * (1 + 0.01 * sign)})
     replicates = pd.DataFrame(rows)
-    for column in (*OTHER_RESISTANCES, "soft_contact_compaction", "overlap_max", "wall_s"):
+    for column in (*OTHER_RESISTANCES, "soft_contact_compaction", "pull_off_over_weight", "overlap_max", "wall_s"):
         replicates[column] = 1.0
     table = filter_design(alum_study.model, csds(alum_study), summarise(replicates)).set_index("csd")
     assert list(table["crystallizer_volume_m3"]) == pytest.approx([5, 10, 15, 20])
@@ -146,7 +146,14 @@ def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:
             porosity = 0.6
         rows.append({**point.row(), "status": "ok", "porosity": porosity - 0.01, "porosity_paper_count": porosity})
     replicates = pd.DataFrame(rows)
-    for column in ("resistance_m_kg", *OTHER_RESISTANCES, "soft_contact_compaction", "overlap_max", "wall_s"):
+    for column in (
+        "resistance_m_kg",
+        *OTHER_RESISTANCES,
+        "soft_contact_compaction",
+        "pull_off_over_weight",
+        "overlap_max",
+        "wall_s",
+    ):
         replicates[column] = 1.0
     table = table4(pmma_study.model, csds(pmma_study), summarise(replicates)).set_index("csd")
     assert list(table.index) == list(printed)
