@@ -87,7 +87,7 @@ def commented(text):
         ("src/filtercake/crystals/csd.py", {"csd", "packing", "points", *AFTER_PACKING}),
         ("src/filtercake/packing/cloud.py", {"packing", "points", *AFTER_PACKING}),
         ("liggghts_templates/packing.in.j2", {"packing", *AFTER_PACKING}),
-        ("src/filtercake/packing/porosity.py", {"points", *AFTER_PACKING}),
+        ("src/filtercake/packing/porosity.py", AFTER_PACKING),
         ("src/filtercake/results/paper_tables.py", {"tables", "provenance"}),
         ("src/filtercake/figures/cross_section.py", {"figure", "provenance"}),
         ("workflow/scripts/packing.py", {"packing", *AFTER_PACKING}),

@@ -48,7 +48,9 @@ def points_by_name(studies):
 
 
 try:
-    files = [CONFIG_FILE, *workflow.overwrite_configfiles]
+    files = [*workflow.overwrite_configfiles]
+    if not workflow.modifier.skip_configfile:
+        files.insert(0, CONFIG_FILE)
     named = with_names_as_written(
         config, map(Path, files), workflow.config_settings.config_args or []
     )
