@@ -18,7 +18,7 @@ RULES = PROJECT / "workflow" / "rules"
 @pytest.fixture(scope="module")
 def asked() -> Callable[..., bool]:
     """The workflow's own function, for the default study; takes the words Snakemake is started with."""
-    (text,) = re.findall(r"^def validation_is_asked.*?\n\n\n", (RULES / "common.smk").read_text(), re.M | re.S)
+    (text,) = re.findall(r"^def validation_is_asked.*?(?=\n\n\n|\Z)", (RULES / "common.smk").read_text(), re.M | re.S)
 
     def call(*words: str, program: str = "/x/.venv/bin/snakemake") -> bool:
         names = {
