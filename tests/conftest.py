@@ -30,13 +30,6 @@ ALUM_G_TAU = {15: 58.417e-6, 30: 67.103e-6, 45: 72.771e-6, 60: 77.081e-6}
 """Growth rate times residence time (m) of the ammonium alum crystallizer by residence time (min)."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests of a file in one of several processes, so that what they share is made once."""
-    for item in items:
-        if item.get_closest_marker("xdist_group") is None:
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
-
-
 @pytest.fixture
 def liggghts() -> str:
     """Path of LIGGGHTS; skips the test where there is none."""

@@ -15,8 +15,6 @@ from checkouts import TINY, Checkout
 
 from filtercake.report.catalogue import PAGES
 
-pytestmark = pytest.mark.xdist_group("tiny_study")
-
 WALK = Path(__file__).with_name("walk_report.js")
 NOWHERE = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
 """Makes every request fail: the report needs none."""

@@ -11,8 +11,6 @@ import pytest
 from filtercake.figures.catalogue import FIGURES
 from filtercake.results.replicates import REPLICATE_COLUMNS, SUMMARY_COLUMNS
 
-pytestmark = pytest.mark.xdist_group("tiny_study")
-
 AFTER_PACKING = {"replicates", "summary", "tables", "figure", "provenance"}
 
 
