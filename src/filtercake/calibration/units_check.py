@@ -98,7 +98,7 @@ def unit_problems(measurements: Measurements, study: LoadedStudy, file: str) -> 
         likely = _likely(entry.resistance, entry.csd, study, given)
         yield Problem(
             file,
-            f"resistance of {entry.name}",
+            f"resistance of {entry.name}" + (f", {entry.source}" if entry.source else ""),
             f"{entry.resistance:.4g} m/kg",
             f"implies a porosity of {_shown(porosity)} for {entry.csd}, outside {SMALLEST_POROSITY:g} to "
             f"{LARGEST_POROSITY:g}: {_advice(likely)}; if all units are right, set material.trust_units: true in the "
