@@ -18,7 +18,7 @@ from filtercake.packing.cloud import BedSize
 from filtercake.packing.scene import Scene
 from filtercake.study import engine_choice
 from filtercake.study.config.study import Study, Workflow
-from filtercake.study.loading import (
+from filtercake.study.loading import LoadedStudy, (
     find_studies,
     load_studies,
     load_study,
@@ -833,3 +833,25 @@ def test_residence_times_need_a_crystallizer(tmp_path: Path) -> None:
         "sweeps[0].residence_time_min",
         "material.density_kg_m3",
     }
+
+
+@pytest.mark.parametrize(
+    ("block", "key", "new"),
+    [
+        ("packing: {void_fraction: 0.65}", "packing.void_fraction", "initial_void_fraction"),
+        ("packing: {column_ratio: 2}", "packing.column_ratio", "bed_depth_factor"),
+        ("packing: {porosity_interval: 0.002}", "packing.porosity_interval", "porosity_ci95_target"),
+        (
+            "crystallizer: {kinetics: ammonium_alum, slurry_density_kg_m3: 200}",
+            "crystallizer.slurry_density_kg_m3",
+            "slurry_concentration_kg_m3",
+        ),
+    ],
+)
+def test_a_key_of_an_earlier_version_is_refused_with_its_new_name(
+    block: str, key: str, new: str, study_from: Callable[..., LoadedStudy], good_study: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        study_from(f"{good_study}{block}\n")
+    problem = next(problem for problem in caught.value.problems if problem.key == key)
+    assert problem.allowed == f"is now called {new}"
