@@ -18,7 +18,8 @@ from filtercake.packing.cloud import BedSize
 from filtercake.packing.scene import Scene
 from filtercake.study import engine_choice
 from filtercake.study.config.study import Study, Workflow
-from filtercake.study.loading import LoadedStudy, (
+from filtercake.study.loading import (
+    LoadedStudy,
     find_studies,
     load_studies,
     load_study,
