@@ -8,7 +8,7 @@ import pytest
 
 from filtercake.statistics import half_width
 from filtercake.study.config.sweep import SWEPT
-from filtercake.validation.agreement import compare_sizes
+from filtercake.validation.agreement import compare_engines, compare_sizes
 
 BASE = dict(zip(SWEPT, (50.0, 0.0, 0.2, 0.3, 5.0), strict=True))
 
@@ -52,3 +52,28 @@ def test_a_large_bed_is_held_against_the_interval_of_the_small_ones(large: float
 
 def test_without_an_interval_nothing_is_within() -> None:
     assert not compare_sizes(beds([0.29], 25_000), beds([0.29], 100_000))["within"].any()
+
+
+@pytest.mark.parametrize(
+    ("half_widths", "agree"), [(0.0, True), (0.95, True), (-0.95, True), (1.05, False), (-1.05, False), (2.0, False)]
+)
+def test_engines_agree_within_the_interval_of_their_difference_alone(half_widths: float, agree: bool) -> None:
+    values = np.array([0.3500, 0.3510, 0.3520, 0.3510, 0.3505, 0.3515])
+    # of two samples of one spread, Welch's interval is Student's by 2 (n - 1) degrees of freedom
+    half = 2.228139 * float(np.std(values, ddof=1)) * (2.0 / values.size) ** 0.5
+    ours = beds(list(values + half_widths * half), 2000).assign(engine="embedded")
+    theirs = beds(list(values), 2000).assign(engine="liggghts")
+    table = compare_engines(pd.concat([theirs, ours]), "liggghts", "embedded")
+    (row,) = table.to_dict("records")
+    assert row["sharp"]
+    assert row["difference_ci95"] == pytest.approx(half, rel=1e-6)
+    assert bool(row["agree"]) == agree
+
+
+def test_ensembles_too_wide_to_tell_do_not_agree() -> None:
+    wide = [0.34, 0.35, 0.36]
+    both = pd.concat([beds(wide, 2000).assign(engine=engine) for engine in ("liggghts", "embedded")])
+    (row,) = compare_engines(both, "liggghts", "embedded").to_dict("records")
+    assert row["difference"] == 0.0
+    assert not row["sharp"]
+    assert not row["agree"]
