@@ -240,7 +240,7 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
         With every problem found.
     """
     model = parse(Calibration, read_yaml(path), str(path))
-    study = load_study(_study_path(model, path, studies))
+    study = _load_study(model, path, studies)
     if not is_file(path.parent / model.measurements):
         allowed = "no such file; must be the path of a file of measurements, relative to this file"
         raise ConfigError([Problem(str(path), "measurements", shown(model.measurements), allowed)])
@@ -350,6 +350,16 @@ def _study_path(model: Calibration, path: Path, studies: Path) -> Path:
         return find_studies(Workflow(studies=[model.study]), studies, str(path))[0]
     except ConfigError as error:
         raise ConfigError([replace(problem, key="study") for problem in error.problems]) from None
+
+
+def _load_study(model: Calibration, path: Path, studies: Path) -> LoadedStudy:
+    try:
+        return load_study(_study_path(model, path, studies))
+    except ConfigError as error:
+        if error.problems[0].file == str(path):
+            raise
+        own = Problem(str(path), "study", shown(model.study), "this study cannot be used:")
+        raise ConfigError([own, *error.problems]) from None
 
 
 def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements, path: Path) -> Iterable[Problem]:

@@ -52,6 +52,8 @@ Form = Literal["integral", "differential"]
 
 MINIMUM_READINGS: Final = 2
 """Readings below which a test is refused: a line needs two."""
+WIDEST_SPAN: Final = 1e8
+"""Factor by which a reading may differ from the median of its test: no instrument shows more."""
 
 FEWEST_WITH_SCATTER: Final = 5
 """Readings from which their scatter tells their errors: two more than the differential form has unknowns."""
@@ -519,10 +521,25 @@ def _check_readings(test: FiltrationTest) -> None:
         bad = ~((values > least) & (values < math.inf))
         if bad.any():
             raise FiltrationError(f"{test.name}: {key} = {values[bad][0]:g} {unit}: must be positive and finite")
+        _check_span(test, key, unit, values)
     back = np.flatnonzero(np.diff(test.time) <= 0.0)
     if back.size:
         at, before = test.time[back[0] + 1], test.time[back[0]]
         raise FiltrationError(f"{test.name}: time = {at:g} s after {before:g} s: times must ascend")
+
+
+def _check_span(test: FiltrationTest, key: str, unit: str, values: FloatArray) -> None:
+    """Refuse a reading that no instrument shows beside the others of the same test."""
+    positive = values[values > 0.0]
+    usual = float(np.median(positive)) if positive.size else 1.0
+    shown = np.where(values > 0.0, values, usual)
+    odd = np.flatnonzero(np.abs(np.log(shown) - math.log(usual)) > math.log(WIDEST_SPAN))
+    if odd.size:
+        where = test.named(odd[0], odd[0] + 1)
+        raise FiltrationError(
+            f"{test.name}: {where}: {key} = {values[odd[0]]:g} {unit} beside {usual:g} {unit} of the others: must be "
+            f"within a factor of {WIDEST_SPAN:g}"
+        )
 
 
 def _require_spread(name: str, design: FloatArray, form: Form) -> None:

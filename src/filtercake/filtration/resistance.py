@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import scipy
 
 from filtercake.crystals.csd import CrystalSizeDistribution
@@ -60,15 +61,16 @@ def implied_porosity(resistance: float, csd: CrystalSizeDistribution, density: f
     if not (resistance > 0.0 and math.isfinite(resistance)):
         raise ValueError(f"resistance {resistance:g} m/kg is not positive")
     at_half = kozeny_carman(0.5, csd, density, sphericity)
-    # (1 - eps)/eps^3 falls from infinity to 0: one root, found in ln(eps/(1 - eps)) where it is nowhere steep
-    ratio = math.log(resistance / at_half)
+    # (1 - eps)/eps^3 falls from infinity to 0: one root, found in ln(eps/(1 - eps)), where its slope is -3 to -1
+    ratio = math.log(resistance) - math.log(at_half)
+    farthest = abs(ratio) + 1.0
+    root = float(scipy.optimize.brentq(lambda odds: _log_solids_over_cube(odds) - ratio, -farthest, farthest))
+    return float(scipy.special.expit(root))
 
-    def excess(odds: float) -> float:
-        porosity = 1.0 / (1.0 + math.exp(-odds))
-        return math.log((1.0 - porosity) / porosity**3) - math.log(4.0) - ratio
 
-    root = float(scipy.optimize.brentq(excess, -30.0, 30.0, xtol=1e-14))
-    return 1.0 / (1.0 + math.exp(-root))
+def _log_solids_over_cube(odds: float) -> float:
+    """Logarithm of ``(1 - eps) / eps^3`` over its value at one half, from ``ln(eps / (1 - eps))``."""
+    return float(3.0 * np.logaddexp(0.0, -odds) - np.logaddexp(0.0, odds)) - math.log(4.0)
 
 
 def _prefactor(porosity: float, density: float, sphericity: float) -> float:

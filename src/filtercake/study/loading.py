@@ -379,8 +379,8 @@ def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
             yield Problem(file, key, repr(name), allowed)
 
 
-def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str, tuple[str, float]], Scene]]:
-    """Every scene of a study, with the keys and values that a finding of the fence may be about."""
+def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[str, dict[str, tuple[str, float]], Scene]]:
+    """Every scene of a study: its distribution, and the keys and values that a finding of the fence may be about."""
     for index, sweep in enumerate(model.sweeps):
         axes = [_values(model, index, name) for name in SWEPT]
         known = [name for name in sweep.csd or [] if name in csds]
@@ -394,7 +394,7 @@ def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[dict[str
                 "density": ("material.density_kg_m3", model.material.density),
                 "particles": ("packing.particles", float(scene.particles)),
             }
-            yield keys, scene
+            yield name, keys, scene
 
 
 def _time_step_key(packing: Packing, fraction: float) -> tuple[str, float]:
@@ -429,8 +429,11 @@ def _findings(
 ) -> list[Problem]:
     """List what a check of the fence finds about all scenes, one problem per key."""
     found: dict[str, Problem] = {}
-    for keys, scene in _scenes(model, csds):
+    for name, keys, scene in _scenes(model, csds):
         for finding in check(scene):
             key, value = keys[finding.key]
-            found.setdefault(key, Problem(file, key, f"{value:g}", finding.text))
+            text = finding.text
+            if finding.key == "particles":  # too few of them for this distribution
+                text = "{1} ({0[0]} = {0[1]})".format(_source_of(name, model.csds[name]), text)
+            found.setdefault(key, Problem(file, key, f"{value:g}", text))
     return list(found.values())

@@ -185,3 +185,9 @@ def test_the_name_of_a_calibration_s_file_must_be_allowed(tmp_path: Path) -> Non
     with pytest.raises(ConfigError) as error:
         load_calibrations([str(path)], tmp_path, STUDIES, "config/config.yaml")
     assert "'" + str(path) + "': the file's name must be letters, digits" in str(error.value)
+
+
+def test_a_study_that_cannot_be_used_is_named_with_the_file_that_names_it(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"mine.yaml: study = 'measured.yaml': this study cannot") as found:
+        load(tmp_path, TINY.replace("../tiny.yaml", "measured.yaml"))
+    assert any(problem.file.endswith("measured.yaml") for problem in found.value.problems)

@@ -481,3 +481,12 @@ def test_compressibility_refuses(arguments: tuple[Any, ...], says: str) -> None:
 def test_resistance_at_refuses_no_pressure() -> None:
     with pytest.raises(FiltrationError, match="pressure_drop = 0 Pa"):
         compressibility(PRESSURES, law(PRESSURES)).resistance_at([1e5, 0.0])
+
+
+@pytest.mark.parametrize(("key", "at", "factor"), [("volume", 3, 1e-300), ("volume", 19, 1e200), ("time", 0, 1e-12)])
+def test_a_reading_no_instrument_shows_is_named(key: str, at: int, factor: float) -> None:
+    test = make()
+    values = getattr(test, key).copy()
+    values[at] *= factor
+    with pytest.raises(FiltrationError, match=rf"reading {at + 1}: {key} = .*must be within a factor of 1e\+08"):
+        dataclasses.replace(test, **{key: values})

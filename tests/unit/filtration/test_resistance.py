@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
-from filtercake.filtration.resistance import carman_sauter, kozeny_carman, log_sensitivity
+from filtercake.filtration.resistance import carman_sauter, implied_porosity, kozeny_carman, log_sensitivity
 
 UM = 1e-6
 
@@ -133,3 +133,11 @@ def test_bad_arguments_are_refused(pmma, arguments: tuple[float, float, float], 
         with pytest.raises(ValueError) as caught:
             law(porosity, pmma(0.5), density, sphericity)
         assert says in str(caught.value)
+
+
+@given(distributions(), st.floats(-300.0, 300.0))
+def test_any_positive_resistance_implies_a_porosity(csd: CrystalSizeDistribution, exponent: float) -> None:
+    found = implied_porosity(10.0**exponent, csd, 1180.0)
+    assert 0.0 <= found <= 1.0
+    if 1e-6 < found < 1.0 - 1e-6:
+        assert kozeny_carman(found, csd, 1180.0) == pytest.approx(10.0**exponent, rel=1e-8)
