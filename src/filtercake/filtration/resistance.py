@@ -128,7 +128,7 @@ RESISTANCE_LAWS: Final[dict[str, ResistanceLaw]] = {
     for law in (
         ResistanceLaw(
             name=ADDITIVE,
-            title="eq. 3, additive",
+            title="additive (eq. 3)",
             equation=f"alpha = {KOZENY_CARMAN:g} (1 - eps) / (eps^3 psi^2 rho) sum(x / d^2)",
             units=_UNITS,
             validity="creeping flow; layers of one size each in series, and so cakes of one size",
@@ -140,7 +140,7 @@ RESISTANCE_LAWS: Final[dict[str, ResistanceLaw]] = {
         ),
         ResistanceLaw(
             name=CARMAN,
-            title="Carman, Sauter mean",
+            title="Carman (Sauter mean)",
             equation=f"alpha = {CARMAN_CONSTANT:g} (1 - eps) / (eps^3 psi^2 rho) (sum(x / d))^2",
             units=_UNITS,
             validity="creeping flow; mixed cakes of spheres, porosity 0.23 to 0.46, size ratio up to 15",
@@ -152,7 +152,7 @@ RESISTANCE_LAWS: Final[dict[str, ResistanceLaw]] = {
         ),
         ResistanceLaw(
             name=STOKES,
-            title="Stokes flow in the packing",
+            title="Stokes (flow in the packings)",
             equation="alpha = K (1 - eps) / (eps^3 psi^2 rho) (sum(x / d))^2, K solved on the packings",
             units=_UNITS,
             validity="creeping flow; the packings that K was solved on, any width",
@@ -178,7 +178,8 @@ def law_of(name: str) -> ResistanceLaw:
         return RESISTANCE_LAWS[name]
     except KeyError:
         known = ", ".join(RESISTANCE_LAWS)
-        raise ValueError(f"unknown resistance law {name!r}; allowed: {known}{did_you_mean(name, RESISTANCE_LAWS)}") from None
+        near = did_you_mean(name, RESISTANCE_LAWS)
+        raise ValueError(f"unknown resistance law {name!r}; allowed: {known}{near}") from None
 
 
 def resistance(

@@ -375,8 +375,7 @@ def _law_problems(model: Study, file: str) -> Iterable[Problem]:
     if law_of(model.resistance_law).needs_kozeny_constant:
         usable = [law.name for law in RESISTANCE_LAWS.values() if not law.needs_kozeny_constant]
         allowed = (
-            "needs the flow solved in the study's packings, which a study cannot ask for; allowed: "
-            f"{', '.join(usable)}"
+            f"needs the flow solved in the study's packings, which a study cannot ask for; allowed: {', '.join(usable)}"
         )
         yield Problem(file, "resistance_law", repr(model.resistance_law), allowed)
 
