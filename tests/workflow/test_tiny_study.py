@@ -129,6 +129,19 @@ def test_a_label_in_the_study_makes_no_packing(finished):
     assert set(planned) - {"all"} == {"tables", "figure", "provenance"}
 
 
+def test_another_resistance_law_makes_tables_and_figures_only(finished):
+    summary = pd.read_csv(finished.results / "summary.csv")
+    assert (summary["resistance_law"] == "additive").all()
+    assert np.allclose(summary["resistance_m_kg"], summary["resistance_additive_m_kg"])
+    study = finished.root / "config/test/tiny.yaml"
+    with edited(study, lambda text: text.replace("packing:\n", "resistance_law: carman\n\npacking:\n")):
+        planned = finished.planned()
+        assert set(planned) - {"all"} == AFTER_PACKING
+    with edited(study, lambda text: text.replace("packing:\n", "resistance_law: stokes\n\npacking:\n")):
+        refused = finished.run("--dry-run")
+    assert refused.returncode != 0 and "resistance_law = 'stokes': needs the flow solved" in refused.stderr
+
+
 def test_more_time_pictures_or_processes_make_no_packing_anew(finished):
     study = finished.root / "config/test/tiny.yaml"
     more = "packing:\n  time_limit_min: 300\n  write_vtk: true\n  processes: 2\n"

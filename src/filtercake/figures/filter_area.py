@@ -96,7 +96,13 @@ def _beside(axes: Axes, table: pd.DataFrame, column: str, law: str) -> None:
     """Plot what another law gives of the same packings."""
     look = style.colour(1 + ALWAYS.index(law))
     axes.plot(
-        table[VOLUME], table[column], "--", color=look, linewidth=0.9, label=selection.law_title(law), gid="beside"
+        table[VOLUME],
+        table[column],
+        "--",
+        color=look,
+        linewidth=0.9,
+        label=f"same packings by {selection.law_title(law)}",
+        gid="beside",
     )
 
 

@@ -128,7 +128,7 @@ RESISTANCE_LAWS: Final[dict[str, ResistanceLaw]] = {
     for law in (
         ResistanceLaw(
             name=ADDITIVE,
-            title="additive (eq. 3)",
+            title="eq. 3 (additive)",
             equation=f"alpha = {KOZENY_CARMAN:g} (1 - eps) / (eps^3 psi^2 rho) sum(x / d^2)",
             units=_UNITS,
             validity="creeping flow; layers of one size each in series, and so cakes of one size",
@@ -152,7 +152,7 @@ RESISTANCE_LAWS: Final[dict[str, ResistanceLaw]] = {
         ),
         ResistanceLaw(
             name=STOKES,
-            title="Stokes (flow in the packings)",
+            title="Stokes flow in the packings",
             equation="alpha = K (1 - eps) / (eps^3 psi^2 rho) (sum(x / d))^2, K solved on the packings",
             units=_UNITS,
             validity="creeping flow; the packings that K was solved on, any width",

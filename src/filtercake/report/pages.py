@@ -78,7 +78,7 @@ def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Map
 
 
 def parameters(study: Study) -> pd.DataFrame:
-    """Tabulate material and packing settings that are given or have a default, and the law: parameter, value, meaning."""
+    """Tabulate the settings that are given or have a default, and the resistance law: parameter, value, meaning."""
     rows = [
         (words.heading(name), words.cell(getattr(part, name)), info.description or "")
         for part in (study.material, study.packing)
