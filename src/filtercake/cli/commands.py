@@ -366,7 +366,10 @@ def _run_resistance(options: argparse.Namespace) -> int:
     half = found.resistance_ci95_m_kg
     interval = "m/kg" if half is None else _interval(half, "m/kg")
     return _print_lines(
-        [*_resistances(asdict(found), interval), ("change per 0.01 of porosity", 100.0 * found.change_per_0p01_porosity, "%")]
+        [
+            *_resistances(asdict(found), interval),
+            ("change per 0.01 of porosity", 100.0 * found.change_per_0p01_porosity, "%"),
+        ]
     )
 
 
