@@ -2,13 +2,16 @@
 
 import json
 import os
+import shutil
 from contextlib import contextmanager
 
 import numpy as np
 import pandas as pd
 import pytest
+from checkouts import Checkout
 
 from filtercake.figures.catalogue import FIGURES
+from filtercake.filtration.resistance import CARMAN_CONSTANT, CARMAN_CONSTANT_CI95
 from filtercake.results.replicates import REPLICATE_COLUMNS, SUMMARY_COLUMNS
 
 AFTER_PACKING = {"replicates", "summary", "tables", "figure", "provenance"}
@@ -127,6 +130,37 @@ def test_a_label_in_the_study_makes_no_packing(finished):
     with edited(study, lambda text: text.replace("50/50 wt% 30/50 um", "another label")):
         planned = finished.planned()
     assert set(planned) - {"all"} == {"tables", "figure", "provenance"}
+
+
+def test_another_resistance_law_makes_tables_and_figures_only(finished):
+    summary = pd.read_csv(finished.results / "summary.csv")
+    assert (summary["resistance_law"] == "additive").all()
+    assert np.allclose(summary["resistance_m_kg"], summary["resistance_additive_m_kg"])
+    study = finished.root / "config/test/tiny.yaml"
+    with edited(study, lambda text: text.replace("packing:\n", "resistance_law: carman\n\npacking:\n")):
+        planned = finished.planned()
+        assert set(planned) - {"all"} == AFTER_PACKING
+    with edited(study, lambda text: text.replace("packing:\n", "resistance_law: stokes\n\npacking:\n")):
+        refused = finished.run("--dry-run")
+    assert refused.returncode != 0 and "resistance_law = 'stokes': needs the flow solved" in refused.stderr
+
+
+def test_another_resistance_law_is_in_the_tables_end_to_end(finished, tmp_path):
+    copy = Checkout(shutil.copytree(finished.root, tmp_path / "copy", symlinks=True))
+    study = copy.root / "config/test/tiny.yaml"
+    study.write_text(study.read_text().replace("packing:\n", "resistance_law: carman\n\npacking:\n"))
+    done = copy.run("--", "results/tiny/tables/table4.csv")
+    assert done.returncode == 0, done.stderr + done.stdout
+    before, after = (pd.read_csv(where.results / "summary.csv") for where in (finished, copy))
+    table4 = pd.read_csv(copy.results / "tables/table4.csv")
+    for table in (after, table4):
+        assert (table["resistance_law"] == "carman").all()
+        assert np.allclose(table["resistance_m_kg"], table["resistance_carman_m_kg"])
+        relative = table["resistance_law_ci95_m_kg"] / table["resistance_m_kg"]
+        assert np.allclose(relative, CARMAN_CONSTANT_CI95 / CARMAN_CONSTANT)
+    assert np.allclose(after["resistance_additive_m_kg"], before["resistance_m_kg"])
+    assert np.allclose(after["resistance_ci95_m_kg"], before["resistance_carman_ci95_m_kg"])
+    assert np.allclose(after["porosity"], before["porosity"])
 
 
 def test_more_time_pictures_or_processes_make_no_packing_anew(finished):

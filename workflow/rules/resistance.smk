@@ -42,6 +42,7 @@ rule replicates:
         library=library("results.replicates"),
         points=point_rows,
         sphericity=lambda wildcards: study_of(wildcards).model.material.sphericity,
+        law=lambda wildcards: study_of(wildcards).model.resistance_law,
     message:
         "porosity and resistance of every packing of {wildcards.study}"
     script:

@@ -9,10 +9,10 @@ from filtercake.run.job import job
 from filtercake.study.points import Point
 
 
-def main(points, packings, csd_tables, sphericity, output):
+def main(points, packings, csd_tables, sphericity, law, output):
     """Measure and write the table."""
     csds = read_tables(csd_tables)
-    table = replicates_table(points, packings, csds, sphericity)
+    table = replicates_table(points, packings, csds, sphericity, law)
     with publish(output) as temporary:
         table.to_csv(temporary, index=False)
 
@@ -23,5 +23,6 @@ with job(snakemake.log[0], snakemake.output):
         Path(snakemake.output[0]).parent / "packings",
         snakemake.input.csds,
         snakemake.params.sphericity,
+        snakemake.params.law,
         Path(snakemake.output[0]),
     )

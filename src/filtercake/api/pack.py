@@ -13,6 +13,7 @@ import pandas as pd
 
 from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
 from filtercake.errors import ConfigError, PackingRejected, Problem
+from filtercake.filtration.resistance import CARMAN
 from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates, point_key
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.result import read_sealed, write_json
@@ -55,7 +56,13 @@ class Bed:
 
 
 def pack(
-    source: Distribution, folder: str | Path, *, say: Report = lambda _: None, replace: bool = False, **options: Any
+    source: Distribution,
+    folder: str | Path,
+    *,
+    law: str = CARMAN,
+    say: Report = lambda _: None,
+    replace: bool = False,
+    **options: Any,
 ) -> Bed:
     """Pack spheres of a size distribution, and measure porosity and resistance.
 
@@ -68,6 +75,8 @@ def pack(
         The size distribution.
     folder : str or Path
         Receives the packings, ``r<k>.npz`` and ``.json``; new, empty, or of an earlier call.
+    law : str
+        Law of the resistance (see :func:`resistance`), which decides nothing of the packings.
     say : callable
         Receives a line per packing.
     replace : bool
@@ -84,18 +93,18 @@ def pack(
     """
     material = {name: value for name, value in options.items() if name in Material.model_fields}
     packing = {name: value for name, value in options.items() if name not in material}
-    study = load(source.options, material, packing)
+    study = load(source.options, material, packing, law)
     path, name = Path(folder), csd_name(study)
     _check_folder(path)
     point = base_point(study, name, engine_choice.choose)
     csd = study.csds[name]
     # a resistance beyond floating point is found before the packings are made, not after
-    resistance(source, porosity=0.01, density_kg_m3=point.scene.density, sphericity=study.model.material.sphericity)
+    sphericity = study.model.material.sphericity
+    resistance(source, porosity=0.01, density_kg_m3=point.scene.density, sphericity=sphericity, law=law)
     if not replace:
         _check_packings(path, point_key(packing_code(point.scene.engine), point.scene))
     outcomes = _make(point, path, say)
-    sizes, sphericity = (csd.full, csd.truncated), study.model.material.sphericity
-    rows = list(replicate_rows(point, outcomes, path, sizes, sphericity))
+    rows = list(replicate_rows(point, outcomes, path, (csd.full, csd.truncated), sphericity, law))
     table = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
     summary = _summary(table, point)
     write_json(path / SUMMARY, {**summary, "versions": versions()})

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,16 +20,17 @@ from filtercake.crystals.crystallizer import SteadyState
 from filtercake.crystals.csd import CrystalSizeDistribution, kept_volume
 from filtercake.errors import ConfigError, CsdError, FilterError, PackingRejected, Problem
 from filtercake.filtration.drum_filter import area, cake_mass_per_area, cake_thickness, capacity, medium_share
-from filtercake.filtration.resistance import carman_sauter, kozeny_carman, log_sensitivity
+from filtercake.filtration.resistance import CARMAN, KozenyConstant, law_of, log_sensitivity
 from filtercake.packing.cloud import NARROW_PARTICLES
 from filtercake.packing.porosity import measure, porosity_profile
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
 from filtercake.packing.slab import bed_height
 from filtercake.results.filter_design import drum_filter
+from filtercake.results.resistance_columns import ALWAYS, LAW_CI95, resistance_columns
 from filtercake.study.config.crystals import Lognormal, RosinRammler
 from filtercake.study.config.filter import Filter
-from filtercake.study.config.values import TO_NUMBER, Density, Model
+from filtercake.study.config.values import TO_NUMBER, Density, LawName, Model
 from filtercake.study.limits import unit_problems
 from filtercake.study.loading import LoadedStudy, check_study, parse
 from filtercake.units import HOUR, MICROMETRE
@@ -85,15 +86,28 @@ class Resistance:
 
     Attributes
     ----------
+    resistance_law : str
+        The law asked for.
     resistance_m_kg : float
-        By the Kozeny-Carman equation with additive resistances (paper, eq. 3), m/kg.
+        By that law, m/kg.
+    resistance_ci95_m_kg : float or None
+        Half-width of its 95 % interval from that of the porosity, to first order; None where that is not given.
+    resistance_law_ci95_m_kg : float or None
+        Half-width of its 95 % interval from the law itself; None where a solved constant's is not given.
+    resistance_additive_m_kg, resistance_carman_m_kg : float
+        By the laws ``additive`` (paper, eq. 3) and ``carman`` (Sauter mean), m/kg.
     resistance_sauter_m_kg : float
-        By Carman's specific surface, m/kg.
+        By Carman's form with eq. 3's constant, m/kg.
     change_per_0p01_porosity : float
-        Relative change of both when the porosity rises by 0.01, to first order.
+        Relative change of all of them when the porosity rises by 0.01, to first order.
     """
 
+    resistance_law: str
     resistance_m_kg: float
+    resistance_ci95_m_kg: float | None
+    resistance_law_ci95_m_kg: float | None
+    resistance_additive_m_kg: float
+    resistance_carman_m_kg: float
     resistance_sauter_m_kg: float
     change_per_0p01_porosity: float
 
@@ -157,8 +171,23 @@ class PackingPorosity:
 class ResistanceOptions(Model):
     """Arguments of :func:`resistance`, besides the distribution."""
 
+    law: LawName = Field(
+        default=CARMAN,
+        description="Law of the resistance: additive is the paper's eq. 3, carman takes the Sauter mean, stokes a "
+        "constant from the flow solved in packings.",
+    )
+
     porosity: Annotated[float, Field(ge=0.001, le=0.999, allow_inf_nan=False), TO_NUMBER] = Field(
         description="Porosity of the cake."
+    )
+    porosity_ci95: Annotated[float, Field(ge=0, le=0.5, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None, description="Half-width of the porosity's 95 % interval, for the resistance's."
+    )
+    kozeny_constant: Annotated[float, Field(ge=1, le=10_000, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None, description="Kozeny constant solved on packings; goes with the law stokes."
+    )
+    kozeny_constant_ci95: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False), TO_NUMBER] | None = Field(
+        default=None, description="Half-width of that constant's 95 % interval."
     )
     density_kg_m3: Density | None = Field(
         default=None, description="Crystal density, kg/m3; that of the crystallizer's kinetics if left out."
@@ -230,14 +259,16 @@ def distribution(**options: Any) -> Distribution:
 
 
 def resistance(source: Distribution, **options: Any) -> Resistance:
-    """Specific cake resistance from porosity and size distribution, by two laws.
+    """Specific cake resistance from porosity and size distribution, by a law, with the others beside it.
 
     Parameters
     ----------
     source : Distribution
         The size distribution; all of it counts, whatever is left out of the packing.
     **options
-        ``porosity``, ``density_kg_m3`` (not needed with kinetics), ``sphericity``, ``trust_units``.
+        ``porosity``, ``porosity_ci95``, ``density_kg_m3`` (not needed with kinetics), ``sphericity``,
+        ``trust_units``; ``law`` (carman if left out), and with ``stokes`` ``kozeny_constant`` and
+        ``kozeny_constant_ci95``.
 
     Raises
     ------
@@ -259,15 +290,45 @@ def resistance(source: Distribution, **options: Any) -> Resistance:
     ]
     if problems:
         raise ConfigError(problems)
-    law = (given.porosity, source.full, density, given.sphericity)
+    kozeny = _kozeny(given)
     try:
-        found = Resistance(kozeny_carman(*law), carman_sauter(*law), 0.01 * log_sensitivity(given.porosity))
-        if found.resistance_m_kg <= LARGEST_RESISTANCE:
-            return found
+        found = resistance_columns(
+            given.law, given.porosity, (source.full, source.full), density, given.sphericity, kozeny
+        )
+        if max(found[f"resistance_{law}_m_kg"] for law in ALWAYS) <= LARGEST_RESISTANCE:
+            return _resistance(given, found)
     except (ZeroDivisionError, OverflowError):
         pass
     allowed = f"is too small to compute with, at {density:g} kg/m3 and a sphericity of {given.sphericity:g}"
     raise ConfigError([_problem("porosity", f"{given.porosity:g}", allowed)])
+
+
+def _kozeny(given: ResistanceOptions) -> KozenyConstant | None:
+    """Constant of the law ``stokes``; refuses one that is missing, or that the law has no use for."""
+    constant, half = given.kozeny_constant, given.kozeny_constant_ci95
+    if law_of(given.law).needs_kozeny_constant:
+        if constant is None:
+            raise ConfigError([_problem("kozeny_constant", "(missing)", f"must be given with the law {given.law}")])
+        return KozenyConstant(constant, math.nan if half is None else half / constant)
+    for name, value in (("kozeny_constant", constant), ("kozeny_constant_ci95", half)):
+        if value is not None:
+            raise ConfigError([_problem(name, f"{value:g}", f"goes with the law stokes, not {given.law}")])
+    return None
+
+
+def _resistance(given: ResistanceOptions, found: Mapping[str, Any]) -> Resistance:
+    """Make the answer from the columns of a table."""
+    sensitivity, law_half = log_sensitivity(given.porosity), found[LAW_CI95]
+    names = [field.name for field in fields(Resistance) if field.name in found]
+    shown = {name: found[name] for name in names if name != LAW_CI95}
+    return Resistance(
+        **shown,
+        resistance_ci95_m_kg=(
+            None if given.porosity_ci95 is None else found["resistance_m_kg"] * abs(sensitivity) * given.porosity_ci95
+        ),
+        resistance_law_ci95_m_kg=law_half if math.isfinite(law_half) else None,
+        change_per_0p01_porosity=0.01 * sensitivity,
+    )
 
 
 def filter_area(**options: Any) -> FilterSize:
@@ -362,9 +423,14 @@ def load_packing(npz: Path) -> tuple[Packing, Scene]:
 
 
 def load(
-    source: Mapping[str, Any], material: Mapping[str, Any], packing: Mapping[str, Any], *, packed: bool = True
+    source: Mapping[str, Any],
+    material: Mapping[str, Any],
+    packing: Mapping[str, Any],
+    law: str = CARMAN,
+    *,
+    packed: bool = True,
 ) -> LoadedStudy:
-    """Check a study of one point: the arguments of :func:`distribution`, and the blocks ``material`` and ``packing``.
+    """Check a study of one point: a :func:`distribution`'s arguments, the blocks ``material`` and ``packing``, a law.
 
     Raises
     ------
@@ -375,7 +441,7 @@ def load(
     if problems:
         raise ConfigError(problems)
     cut = {name: value for name, value in source.items() if name.startswith("truncate_")}
-    study: dict[str, Any] = {"material": dict(material), "packing": dict(packing)}
+    study: dict[str, Any] = {"material": dict(material), "resistance_law": law, "packing": dict(packing)}
     if "kinetics" in source:
         mixer = {name: source[name] for name in CRYSTALLIZER_OPTIONS if name in source}
         study["crystallizer"] = {**mixer, **cut}
@@ -388,6 +454,9 @@ def load(
             loaded = check_study(study, ORIGIN, packed=packed)
         except (ZeroDivisionError, OverflowError):
             raise ConfigError([_problem("options", "", OUT_OF_REACH)]) from None
+        except ConfigError as error:
+            named = {"resistance_law": "law"}  # the argument that the key is here
+            raise ConfigError([replace(p, key=named.get(p.key, p.key)) for p in error.problems]) from None
         _check_sums(loaded)
     return loaded
 

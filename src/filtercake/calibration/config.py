@@ -305,6 +305,7 @@ def settings_of(calibration: LoadedCalibration) -> Settings:
         implied_porosity=calibration.implied_porosity,
         soft_above=_cohesion_at(DOUBTFUL_RELATIVE_OVERLAP, calibration.study),
         doubts=calibration.doubts,
+        resistance_law=calibration.study.model.resistance_law,
     )
 
 
@@ -405,17 +406,14 @@ def _cohesion_at(overlap: float, study: LoadedStudy) -> float:
 
 
 def _implied_porosity(study: LoadedStudy, observations: Iterable[Observation]) -> float:
-    material = study.model.material
-    return float(
-        np.mean(
-            [
-                implied_porosity(
-                    math.exp(item.ln_resistance), study.csds[item.csd].full, material.density, material.sphericity
-                )
-                for item in observations
-            ]
+    material, law = study.model.material, study.model.resistance_law
+    found = [
+        implied_porosity(
+            math.exp(item.ln_resistance), study.csds[item.csd].full, material.density, material.sphericity, law
         )
-    )
+        for item in observations
+    ]
+    return float(np.mean(found))
 
 
 def _frictions(model: Calibration, porosity: float, distributions: int) -> tuple[float, ...]:

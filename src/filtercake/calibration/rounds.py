@@ -30,7 +30,7 @@ from filtercake.calibration.fit import (
 from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, read_tables
 from filtercake.errors import CalibrationError
 from filtercake.filtration.drum_filter import DrumFilter, area
-from filtercake.filtration.resistance import implied_porosity, kozeny_carman
+from filtercake.filtration.resistance import ADDITIVE, implied_porosity, resistance
 from filtercake.results.replicates import replicates_table
 from filtercake.study.points import Point
 
@@ -73,6 +73,8 @@ class Settings:
         Cohesion from which the softness of the contacts matters, kJ/m3.
     doubts : tuple of Finding
         Doubts about the measurements.
+    resistance_law : str
+        Law between porosity and resistance: the study's.
     """
 
     parameters: tuple[Parameter, ...]
@@ -88,6 +90,7 @@ class Settings:
     implied_porosity: float
     soft_above: float
     doubts: tuple[Finding, ...] = ()
+    resistance_law: str = ADDITIVE
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Settings:
@@ -210,14 +213,13 @@ def simulate(
     The columns are those of :func:`filtercake.results.replicates.replicates_table`, batch and ln_resistance.
     """
     listed = list(candidates)
-    table = replicates_table([c.point for c in listed], packings, csds, settings.sphericity)
+    table = replicates_table([c.point for c in listed], packings, csds, settings.sphericity, settings.resistance_law)
     batches = {c.point.name: c.batch for c in listed}
     table["batch"] = table["point"].map(batches)
+    law, material = settings.resistance_law, (settings.density, settings.sphericity)
     porosity = table["porosity" if settings.estimator == "interior" else "porosity_paper_count"]
     table["ln_resistance"] = [
-        math.log(kozeny_carman(value, csds[str(csd)][0], settings.density, settings.sphericity))
-        if np.isfinite(value)
-        else np.nan
+        math.log(resistance(law, value, csds[str(csd)][0], *material)) if np.isfinite(value) else np.nan
         for value, csd in zip(porosity.to_list(), table["csd"], strict=True)
     ]
     return table
@@ -482,6 +484,7 @@ def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
         "discrepancy": fit.discrepancy,
         "share_of_packings_in_variance": fit.model_share,
         "implied_porosity": settings.implied_porosity,
+        "resistance_law": settings.resistance_law,
         "estimator": settings.estimator,
         "ended": why,
         "findings": [asdict(finding) for finding in outcome.findings],
@@ -618,7 +621,8 @@ def _prediction_row(
     row: dict[str, Any] = {"csd": name}
     row.update(zip(("resistance_m_kg", "resistance_low_m_kg", "resistance_high_m_kg"), ends, strict=True))
     # the porosity falls as the resistance rises: its ends change places
-    porosities = [implied_porosity(alpha, csd, settings.density, settings.sphericity) for alpha in ends]
+    material = (settings.density, settings.sphericity, settings.resistance_law)
+    porosities = [implied_porosity(alpha, csd, *material) for alpha in ends]
     row.update(zip(("porosity", "porosity_high", "porosity_low"), porosities, strict=True))
     row["high_over_resistance"] = found.high / found.resistance
     row["resistance_with_safety_factor_m_kg"] = SAFETY_FACTOR * found.resistance

@@ -120,8 +120,8 @@ def _given(test: FiltrationTest) -> dict[str, float]:
 
 
 def _porosity(resistance: float, csd: str, study: LoadedStudy) -> float:
-    material = study.model.material
-    return implied_porosity(resistance, study.csds[csd].full, material.density, material.sphericity)
+    material, law = study.model.material, study.model.resistance_law
+    return implied_porosity(resistance, study.csds[csd].full, material.density, material.sphericity, law)
 
 
 def _likely(

@@ -20,7 +20,9 @@ from filtercake.cli import options as words
 from filtercake.cli.schema import study_template
 from filtercake.crystals.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
+from filtercake.filtration.resistance import RESISTANCE_LAWS
 from filtercake.packing.result import publish
+from filtercake.results.resistance_columns import others
 from filtercake.statistics import half_width
 from filtercake.study import engine_choice
 from filtercake.study.config.material import Material
@@ -148,6 +150,7 @@ def _add_pack(commands: Any) -> None:
     words.add_source(parser)
     words.add_model(parser.add_argument_group("crystals"), Material)
     words.add_model(parser.add_argument_group("packing"), Packing)
+    words.add_field(parser.add_argument_group("resistance"), "law", api.ResistanceOptions.model_fields["law"])
     parser.add_argument(
         "--output",
         metavar="FOLDER",
@@ -168,10 +171,16 @@ def _add_porosity(commands: Any) -> None:
 
 
 def _add_resistance(commands: Any) -> None:
-    text = "Specific cake resistance (m/kg) from porosity and size distribution, by two laws."
+    text = (
+        "Specific cake resistance (m/kg) from porosity and size distribution by a law, with both parts of its 95 % "
+        "interval: the porosity's and the law's."
+    )
     parser = _command(commands, "resistance", _run_resistance, text)
     words.add_source(parser)
     words.add_model(parser.add_argument_group("cake"), api.ResistanceOptions)
+    parser.add_argument(
+        "--list-laws", action="store_true", help="print each law: equation, units, validity, accuracy, source"
+    )
 
 
 def _add_filter_area(commands: Any) -> None:
@@ -276,7 +285,7 @@ def _say_understood(options: argparse.Namespace, source: api.Distribution) -> No
 
 def _run_pack(options: argparse.Namespace) -> int:
     source = api.distribution(**words.source(options))
-    asked = words.given(options, (*Material.model_fields, *Packing.model_fields))
+    asked = words.given(options, ("law", *Material.model_fields, *Packing.model_fields))
     found = api.pack(source, options.output, say=_say, replace=options.replace, **asked)
     _say_understood(options, source)
     for warning in found.warnings:
@@ -291,13 +300,22 @@ def _run_pack(options: argparse.Namespace) -> int:
         [
             ("porosity, interior", summary["porosity"], _interval(summary["porosity_ci95"], "")),
             ("porosity as published", summary["porosity_paper_count"], ""),
-            ("resistance, eq. 3", summary["resistance_m_kg"], _interval(summary["resistance_ci95_m_kg"], "m/kg")),
-            ("resistance, Carman", summary["resistance_sauter_m_kg"], "m/kg"),
+            *_resistances(summary, _interval(summary["resistance_ci95_m_kg"], "m/kg")),
             ("packings", summary["n"], f"of {summary['particles']} spheres by {summary['engine']}"),
         ]
     )
     print(f"packings are in {options.output}")
     return status
+
+
+def _resistances(found: dict[str, Any], interval: str) -> list[Line]:
+    """Resistance by a law with both parts of its interval, of which the first is in words, and by laws beside it."""
+    law, by_law = found["resistance_law"], found["resistance_law_ci95_m_kg"]
+    return [
+        (f"resistance, {law}", found["resistance_m_kg"], interval),
+        ("uncertainty of the law", "-" if by_law is None else by_law, "m/kg (95 %, half-width)"),
+        *((f"resistance, {other}", found[f"resistance_{other}_m_kg"], "m/kg") for other in others(law)),
+    ]
 
 
 def _interval(half: float | None, unit: str) -> str:
@@ -338,18 +356,31 @@ def _run_porosity(options: argparse.Namespace) -> int:
 
 
 def _run_resistance(options: argparse.Namespace) -> int:
+    if options.list_laws:
+        return _list_laws(options)
     source = api.distribution(**words.source(options))
     found = api.resistance(source, **words.given(options, api.ResistanceOptions.model_fields))
     _say_understood(options, source)
     if options.json:
         return _print_json(asdict(found))
+    half = found.resistance_ci95_m_kg
+    interval = "m/kg" if half is None else _interval(half, "m/kg")
     return _print_lines(
         [
-            ("resistance, sum of x/d2 (eq. 3)", found.resistance_m_kg, "m/kg"),
-            ("resistance, Sauter mean (Carman)", found.resistance_sauter_m_kg, "m/kg"),
+            *_resistances(asdict(found), interval),
             ("change per 0.01 of porosity", 100.0 * found.change_per_0p01_porosity, "%"),
         ]
     )
+
+
+def _list_laws(options: argparse.Namespace) -> int:
+    names = ("name", "title", "equation", "units", "validity", "accuracy", "source")
+    laws = [{name: getattr(law, name) for name in names} for law in RESISTANCE_LAWS.values()]
+    if options.json:
+        return _print_json({"laws": laws})
+    for law in laws:
+        print("\n".join(f"{name:<9} {text}" for name, text in law.items()), end="\n\n")
+    return 0
 
 
 def _run_filter_area(options: argparse.Namespace) -> int:

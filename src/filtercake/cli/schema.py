@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 
 from filtercake.calibration.config import Calibration, CohesionRange
 from filtercake.calibration.measurements import ConstantPressureTest, KnownResistance, MeasurementFile
+from filtercake.filtration.resistance import CARMAN
 from filtercake.study.config.crystals import Crystallizer, Csd, Lognormal, RosinRammler, SizeClass
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
@@ -25,6 +26,7 @@ from filtercake.study.config.study import Study, Workflow
 from filtercake.study.config.sweep import Sweep
 
 EXAMPLES = {
+    "resistance_law": CARMAN,
     "kinetics": "ammonium_alum",
     "slurry_concentration_kg_m3": "200",
     "pressure_drop_kPa": "53.33",
@@ -32,7 +34,7 @@ EXAMPLES = {
     "rotation_rate_rpm": "0.2",
     "medium_resistance_1_m": "5.0e+9",
 }
-"""Values of the keys without a default, for the template."""
+"""Values of the keys without a default, for the template, and of the law that a new study takes."""
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -94,6 +96,9 @@ def study_template() -> str:
             lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")
             default = _yaml(field.get_default(call_default_factory=True))
             lines.append(f"  {key}: {given[key]}" if key in given else f"  # {key}: {default}")
+        if name == "material":
+            law = Study.model_fields["resistance_law"]
+            lines += ["", f"# {meaning(law)} Allowed: {allowed(law)}.", f"resistance_law: {EXAMPLES['resistance_law']}"]
     lines += ["", f"# {meaning(Study.model_fields['sweeps'])}", "sweeps:", "  - csd: [mine]"]
     for key, field in Sweep.model_fields.items():
         if key != "csd":

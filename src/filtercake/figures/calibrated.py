@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from filtercake.calibration.measurements import Measurements
 from filtercake.figures import style
+from filtercake.filtration.resistance import RESISTANCE_LAWS
 from filtercake.packing.engines import label_of
 from filtercake.statistics import half_width, quantile
 from filtercake.units import FloatArray
@@ -159,7 +160,9 @@ def footer(figure: Figure, data: CalibrationData, packings: Sequence[str], engin
     estimator = ESTIMATORS.get(data.summary["estimator"], data.summary["estimator"])
     what = "cohesion and friction fitted" if data.fits_friction else f"cohesion fitted at friction {data.friction:g}"
     names = ", ".join(label_of(name) for name in sorted({str(engine) for engine in engines}))
-    style.footer(figure, pd.DataFrame(), f"{what}, resistances from the {estimator}", *packings, names, *notes)
+    law = RESISTANCE_LAWS[data.summary["resistance_law"]].title
+    said = f"{what}, resistances from the {estimator} by {law}"
+    style.footer(figure, pd.DataFrame(), said, *packings, names, *notes)
 
 
 def panel_title(data: CalibrationData, characters: int) -> str:

@@ -28,12 +28,12 @@ class Beside(NamedTuple):
 
 
 def draw(
-    data: StudyData, columns: tuple[str, str], beside: Beside, label: Callable[[Axes, FloatArray], object]
+    data: StudyData, columns: tuple[str, str], beside: Beside, label: Callable[[Axes, FloatArray], object], *notes: str
 ) -> Figure:
     """Draw a quantity with its 95 % interval, a second estimate, and published values.
 
     ``columns`` are those of the quantity and the half-width of its interval; ``label`` labels a panel's ordinate, given
-    the values it shows.
+    the values it shows; ``notes`` go below the figure.
     """
     cases = selection.varied(data, FREE, "cohesion_kJ_m3")
     count = max(len(cases), 1)
@@ -61,7 +61,7 @@ def draw(
                 style.published_point(axes, value.cohesion_kJ_m3, value.value, value)
         label(axes, rows[columns[0]].to_numpy(np.float64))
     style.legend(figure, panels, extra=[beside.key])
-    style.footer(figure, every, "error bars: 95 % intervals of the mean")
+    style.footer(figure, every, "error bars: 95 % intervals of the mean", *notes)
     return figure
 
 

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from filtercake.figures import selection, style
 from filtercake.figures.filtered import filtered
 from filtercake.figures.selection import StudyData
+from filtercake.results.resistance_columns import ALWAYS, others
 
 VOLUME = "crystallizer_volume_m3"
 ASIDE = 2
@@ -18,16 +19,18 @@ OURS = "this work, 95 % interval"
 
 
 def draw(data: StudyData) -> Figure:
-    """Draw three panels over one abscissa, with the published resistances and areas beside ours."""
+    """Draw three panels over one abscissa, with published values and those by the other laws beside ours."""
     figure, panels = style.panels(3, width=style.SINGLE, height=5.6, sharex=True)
     resistance, area, share = panels
     table = filtered(data)
-    percent = table.assign(
-        **{name: 100.0 * table[name] for name in ("medium_share", "medium_share_low", "medium_share_high")}
-    )
+    percent = table.assign(**{name: 100.0 * table[name] for name in table.columns if name.startswith("medium_share")})
     _series(resistance, table, "resistance_m_kg", "resistance_ci95_m_kg")
     _series(area, table, "filter_area_m2", ("filter_area_low_m2", "filter_area_high_m2"))
     _series(share, percent, "medium_share", ("medium_share_low", "medium_share_high"))
+    for law in others(data.study.resistance_law):
+        _beside(resistance, table, f"resistance_{law}_m_kg", law)
+        _beside(area, table, f"filter_area_{law}_m2", law)
+        _beside(share, percent, f"medium_share_{law}", law)
     published(resistance, data, table, "resistance_m_kg")
     published(area, data, table, "filter_area_m2")
     published(share, data, table, "medium_share", scale=100.0)
@@ -37,7 +40,8 @@ def draw(data: StudyData) -> Figure:
     share.set_ylabel("Share of the medium\nin the resistance (%)")
     style.volume_axis(share, float(table[VOLUME].max()))
     style.legend(figure, panels, columns=1)
-    notes = ["error bars: 95 % intervals of the mean", operating_point(data), fall(table)]
+    notes = ["error bars: 95 % intervals of the mean", selection.law_note(data), operating_point(data), fall(table)]
+    notes.append(change(table))
     if any(line.get_gid() == "published" for axes in panels for line in axes.get_lines()):
         notes.append("published values are set a little to the right")
     style.footer(figure, table, *notes)
@@ -68,6 +72,15 @@ def fall(table: pd.DataFrame) -> str:
     ).replace("-", "−")
 
 
+def change(table: pd.DataFrame) -> str:
+    """Change of the area by Carman's law instead of the additive one, in words; empty where there is no area."""
+    found = 100.0 * table["area_change_by_carman"].dropna()
+    if found.empty:
+        return ""
+    ends = dict.fromkeys(f"{value:+.0f}" for value in (found.min(), found.max()))
+    return f"by Carman instead of eq. 3 the area changes by {' to '.join(ends)} %".replace("-", "−")
+
+
 def operating_point(data: StudyData) -> str:
     """Operating point of the filter, in words."""
     drum = data.study.filter
@@ -76,6 +89,20 @@ def operating_point(data: StudyData) -> str:
     return (
         f"{drum.pressure_drop_kPa:g} kPa, medium {style.scientific(drum.medium_resistance_1_m)} 1/m, "
         f"{drum.rotation_rate_rpm:g} rpm, {100.0 * drum.submerged_fraction:g} % immersed"
+    )
+
+
+def _beside(axes: Axes, table: pd.DataFrame, column: str, law: str) -> None:
+    """Plot what another law gives of the same packings."""
+    look = style.colour(1 + ALWAYS.index(law))
+    axes.plot(
+        table[VOLUME],
+        table[column],
+        "--",
+        color=look,
+        linewidth=0.9,
+        label=f"same packings by {selection.law_title(law)}",
+        gid="beside",
     )
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from filtercake.figures import style
+from filtercake.figures import selection, style
 from filtercake.figures.filter_area import VOLUME, operating_point, published
 from filtercake.figures.filtered import filtered
 from filtercake.figures.selection import StudyData
@@ -65,6 +65,7 @@ def draw(data: StudyData) -> Figure:
         "error bars: 95 % intervals of the mean resistance",
         f"the study's filter: {operating_point(data)}",
         "areas by eq. 10 at our resistances; no further packings",
+        selection.law_note(data),
     )
     return figure
 

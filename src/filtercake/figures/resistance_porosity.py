@@ -1,4 +1,4 @@
-"""Kozeny-Carman resistance against porosity, with our porosities and published values on it (paper, Fig. 8)."""
+"""Resistance by the study's law against porosity, with our porosities and published values on it (paper, Fig. 8)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from filtercake.figures import selection, style
 from filtercake.figures.selection import StudyData
-from filtercake.filtration.resistance import kozeny_carman
+from filtercake.filtration.resistance import resistance
 from filtercake.study.config.published import Published
 
 MARGIN = 0.025
@@ -23,7 +23,7 @@ TYPICAL = (0.32, 0.42)
 
 
 def draw(data: StudyData) -> Figure:
-    """Draw one curve per distribution (eq. 3, full distribution), our mean and its 95 % interval on it."""
+    """Draw one curve per distribution (the study's law, full distribution), our mean and its 95 % interval on it."""
     figure, (axes,) = style.panels(width=style.MEDIUM, height=3.9)
     rows = selection.base_points(data)
     names = list(rows["csd"]) or list(data.csds)
@@ -46,7 +46,7 @@ def draw(data: StudyData) -> Figure:
     axes.set_xlabel(style.POROSITY)
     ours = style.key("this work, 95 % interval", color=style.FAINT, marker="o", linewidth=0.0)
     style.legend(figure, [axes], extra=[ours, *published] if rows["porosity"].notna().any() else published)
-    notes = ["curves: eq. 3 with the full distribution"]
+    notes = [f"curves: {selection.law_title(data.study.resistance_law)} with the full distribution"]
     if any(line.get_gid() == "published" and np.min(line.get_ydata()) == 0.0 for line in axes.get_lines()):
         notes.append("markers on the abscissa: no resistance published")
     if any(value.low is not None for name in names for value in selection.published(data, name, "resistance_m_kg")):
@@ -58,8 +58,8 @@ def draw(data: StudyData) -> Figure:
 
 
 def _resistance(data: StudyData, csd: str, porosity: float) -> float:
-    material = data.study.material
-    return kozeny_carman(porosity, data.csds[csd][0], material.density, material.sphericity)
+    material, law = data.study.material, data.study.resistance_law
+    return resistance(law, porosity, data.csds[csd][0], material.density, material.sphericity)
 
 
 def _ink(data: StudyData, csd: str) -> str:

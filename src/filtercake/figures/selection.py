@@ -13,6 +13,7 @@ import pandas as pd
 from filtercake.crystals.crystallizer import SteadyState
 from filtercake.crystals.csd import FullAndTruncated, read_tables
 from filtercake.errors import PackingRejected
+from filtercake.filtration.resistance import law_of
 from filtercake.packing.result import Packing, read_record
 from filtercake.results.tables import read_table
 from filtercake.study.config.published import Published
@@ -72,6 +73,16 @@ class StudyData:
             packings=folder / "packings",
             crystallizer=next(map(read_table, crystallizer), pd.DataFrame()),
         )
+
+
+def law_title(law: str) -> str:
+    """Name of a resistance law for readers."""
+    return law_of(law).title
+
+
+def law_note(data: StudyData) -> str:
+    """Say by which law a figure's resistances are."""
+    return f"resistances by {law_title(data.study.resistance_law)}"
 
 
 def label(data: StudyData, csd: str) -> str:

@@ -19,6 +19,7 @@ from filtercake.figures.style import FOOTER
 from filtercake.packing.result import publish
 from filtercake.report.pages import engine_names, environment
 from filtercake.report.words import heading, number, with_interval
+from filtercake.results.resistance_columns import LAW_CI95
 from filtercake.study.config.sweep import SWEPT
 
 SUFFIX, FRONT = ".html.j2", "front"
@@ -67,11 +68,12 @@ def study_values(data: StudyData) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``kind``, ``name``, ``title``; ``counts`` (see :func:`packing_counts`); ``particles`` (smallest and largest
-        number of spheres in a packing); ``base`` (porosity and resistance at the base material by distribution),
-        ``points`` (their number) and ``swept`` (values by heading); ``lowest`` and ``highest`` resistance of all;
-        ``cohesion`` and ``sensitivity`` (ends of the series that vary a property); ``products``, ``filter`` and
-        ``kept`` (crystallizer, filter and truncation by distribution); ``compared`` (published porosities).
+        ``kind``, ``name``, ``title``; ``law`` (of the resistance); ``counts`` (see :func:`packing_counts`);
+        ``particles`` (smallest and largest number of spheres in a packing); ``base`` (porosity and resistance at the
+        base material by distribution), ``points`` (their number) and ``swept`` (values by heading); ``lowest`` and
+        ``highest`` resistance of all; ``cohesion`` and ``sensitivity`` (ends of the series that vary a property);
+        ``products``, ``filter`` and ``kept`` (crystallizer, filter and truncation by distribution); ``compared``
+        (published porosities).
     """
     summary = data.summary
     known = summary[summary["resistance_m_kg"].notna()].sort_values("resistance_m_kg")
@@ -80,6 +82,7 @@ def study_values(data: StudyData) -> dict[str, Any]:
         "kind": "study",
         "name": data.name,
         "title": data.study.title or data.name,
+        "law": selection.law_title(data.study.resistance_law),
         "counts": packing_counts(data.replicates),
         "particles": (int(spheres.min()), int(spheres.max())) if len(spheres) else None,
         "base": [_point(data, row) for row in selection.base_points(data).to_dict("records")],
@@ -119,6 +122,7 @@ def _point(data: StudyData, row: Mapping[Any, Any]) -> dict[str, Any]:
         "friction": f"{row['friction']:g}",
         "porosity": with_interval(float(row["porosity"]), float(row["porosity_ci95"])),
         "resistance": with_interval(float(row["resistance_m_kg"]), float(row["resistance_ci95_m_kg"]), "m/kg"),
+        "by_law": f"± {number(float(row[LAW_CI95]), 2)} m/kg",
         "n": int(row["n"]),
         "n_failed": int(row["n_failed"]),
     }
@@ -163,6 +167,10 @@ def _filter(data: StudyData) -> list[dict[str, Any]]:
             "area": number(row["filter_area_m2"], 3),
             "low": number(row["filter_area_low_m2"], 3),
             "high": number(row["filter_area_high_m2"], 3),
+            "by_law": f"{number(row['filter_area_law_low_m2'], 3)} to {number(row['filter_area_law_high_m2'], 3)}",
+            "additive": number(row["filter_area_additive_m2"], 3),
+            "carman": number(row["filter_area_carman_m2"], 3),
+            "change": number(100.0 * row["area_change_by_carman"], 2),
             "share": number(100.0 * row["medium_share"], 2),
         }
         for row in filtered(data).to_dict("records")
@@ -181,16 +189,17 @@ def calibration_values(data: CalibrationData) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``kind``, ``name``, ``title``; ``counts``; ``estimates`` (value and interval by parameter), ``friction`` where
-        it was taken and not fitted; ``measured`` (means by distribution), ``measurements`` (their number),
-        ``predictions``; ``findings`` (sentences), ``ended`` (why the rounds ended); ``tests`` and ``pressures``
-        (numbers of filtration tests and of resistances with a pressure).
+        ``kind``, ``name``, ``title``; ``law`` (of the resistance); ``counts``; ``estimates`` (value and interval by
+        parameter), ``friction`` where it was taken and not fitted; ``measured`` (means by distribution),
+        ``measurements`` (their number), ``predictions``; ``findings`` (sentences), ``ended`` (why the rounds ended);
+        ``tests`` and ``pressures`` (numbers of filtration tests and of resistances with a pressure).
     """
     given = data.measurements
     return {
         "kind": "calibration",
         "name": data.name.removeprefix("calibration_"),
         "title": data.title or data.name,
+        "law": selection.law_title(data.summary["resistance_law"]),
         "counts": packing_counts(data.simulated),
         "estimates": {
             heading(name): calibrated.with_interval(*data.estimate(name)) for name in data.summary["parameters"]

@@ -35,8 +35,9 @@ PAGES: dict[str, PageSpec] = {
     "summary": PageSpec(
         TABLES,
         "Summary of all points",
-        "One row per point: porosity of the bed's interior and specific cake resistance by the Kozeny-Carman equation "
-        f"with the full size distribution. {INTERVALS} n counts accepted packings.",
+        "One row per point: porosity of the bed's interior and specific cake resistance by the study's law with the "
+        f"full size distribution, and by two laws beside it. {INTERVALS} The law has one of its own. n counts accepted "
+        "packings.",
         "summary.csv",
     ),
     "comparison": PageSpec(
@@ -77,7 +78,7 @@ PAGES: dict[str, PageSpec] = {
         TABLES,
         "Drum filter",
         "The filter that each point's slurry needs; low and high are the areas at the ends of the resistance's 95 % "
-        "interval.",
+        "interval over the packings, law low and high at those of the law's own.",
         "tables/filter.csv",
     ),
     "parity": PageSpec(

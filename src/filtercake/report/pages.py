@@ -11,6 +11,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
+from filtercake.filtration.resistance import law_of
 from filtercake.packing.engines import label_of
 from filtercake.packing.result import publish
 from filtercake.report import words
@@ -77,13 +78,15 @@ def contents(folder: Path, packings: pd.DataFrame, study: Study, provenance: Map
 
 
 def parameters(study: Study) -> pd.DataFrame:
-    """Tabulate material and packing settings that are given or have a default: parameter, value, meaning."""
+    """Tabulate the settings that are given or have a default, and the resistance law: parameter, value, meaning."""
     rows = [
         (words.heading(name), words.cell(getattr(part, name)), info.description or "")
         for part in (study.material, study.packing)
         for name, info in type(part).model_fields.items()
         if getattr(part, name) is not None
     ]
+    law = law_of(study.resistance_law)
+    rows.append((words.heading("resistance_law"), law.title, f"{law.equation}; {law.validity}"))
     return pd.DataFrame(rows, columns=["parameter", "value", "meaning"])
 
 

@@ -38,7 +38,11 @@ NAMES = {
     "deviation_sd": "distance in standard deviations",
     "porosity": "porosity of the interior",
     "porosity_paper_count": "porosity as the paper counts",
-    "resistance_sauter": "resistance by Carman's form",
+    "resistance_additive": "resistance by eq. 3 (additive)",
+    "resistance_carman": "resistance by Carman (Sauter mean)",
+    "resistance_sauter": "resistance by Carman's form with eq. 3's constant",
+    "resistance_law": "law of the resistance",
+    "resistance_law_ci95": "half-width of the law's own 95 % interval",
     "resistance_truncated": "resistance of the packed classes alone",
     "overlap_max": "largest overlap over diameter",
     "wall": "time of one packing",
@@ -59,7 +63,7 @@ def split_unit(column: str) -> tuple[str, str]:
 def heading(column: str) -> str:
     """Heading of a column: ``resistance_m_kg`` is "resistance (m/kg)"."""
     name, unit = split_unit(column)
-    if name.endswith(INTERVAL):
+    if name.endswith(INTERVAL) and name not in NAMES:
         return f"{heading(interval_owner(column))}: half-width of the 95 % interval"
     words = NAMES.get(name, name.replace("_", " "))
     return f"{words} ({unit})" if unit else words

@@ -8,17 +8,19 @@ import pandas as pd
 from filtercake.errors import FilterError
 from filtercake.filtration.drum_filter import Cake, DrumFilter, area, design_table
 from filtercake.results.paper_tables import Csds, published_number
+from filtercake.results.resistance_columns import ALWAYS, LAW, LAW_CI95
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.study import Study
-from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
+from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, FloatArray
 
 
 def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     """Tabulate the drum filter that every point's slurry needs (paper, eq. 10 and Fig. 14).
 
-    The columns are crystallizer volume, porosity and resistance, those of
-    :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 % interval,
-    and the published area.
+    The columns are crystallizer volume, porosity and resistance by the study's law, those of
+    :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 % interval
+    over the packings (low, high) and of the law's own (law_low, law_high), the areas by the laws ``additive`` and
+    ``carman`` and the relative change from the first to the second, and the published area.
 
     Raises
     ------
@@ -37,18 +39,29 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
         )
     ]
     columns = ["point", "csd", "residence_time_min", "cohesion_kJ_m3", "friction", "engine", "n", "n_failed"]
-    columns += ["porosity", "porosity_ci95", "resistance_m_kg", "resistance_ci95_m_kg"]
+    columns += ["porosity", "porosity_ci95", "resistance_m_kg", "resistance_ci95_m_kg", LAW, LAW_CI95]
+    columns += [f"resistance_{law}_m_kg" for law in ALWAYS]
     table = summary[columns].reset_index(drop=True)
     table.insert(3, "crystallizer_volume_m3", flow * MINUTE * table["residence_time_min"])
     table = pd.concat([table, design_table(drum, cakes, flow, study.filter.liquid_density_kg_m3)], axis=1)
-    for name, sign in (("filter_area_low_m2", -1.0), ("filter_area_high_m2", 1.0)):
-        # an interval wider than the mean ends just above 0: without a medium, eq. 10 needs some resistance
-        smallest = float(np.finfo(np.float64).tiny)
-        ends = (table["resistance_m_kg"] + sign * table["resistance_ci95_m_kg"]).clip(lower=smallest)
-        known = ends.notna()
-        table.loc[known, name] = area(drum, ends[known].to_numpy(np.float64), flow)
+    mean = table["resistance_m_kg"]
+    for name, half in (("", table["resistance_ci95_m_kg"]), ("law_", table[LAW_CI95])):
+        table[f"filter_area_{name}low_m2"] = _areas(drum, mean - half, flow)
+        table[f"filter_area_{name}high_m2"] = _areas(drum, mean + half, flow)
+    for law in ALWAYS:
+        table[f"filter_area_{law}_m2"] = _areas(drum, table[f"resistance_{law}_m_kg"], flow)
+    table["area_change_by_carman"] = table["filter_area_carman_m2"] / table["filter_area_additive_m2"] - 1.0
     table["published_area_m2"] = [published_number(study, name, "filter_area_m2", "simulation") for name in names]
     return table
+
+
+def _areas(drum: DrumFilter, resistance: pd.Series[float], flow: float) -> FloatArray:
+    """Areas, m2, for resistances, m/kg; nan where there is none."""
+    # an interval wider than the mean ends just above 0: without a medium, eq. 10 needs some resistance
+    values = resistance.clip(lower=float(np.finfo(np.float64).tiny)).to_numpy(np.float64)
+    found, known = np.full(values.shape, np.nan), np.isfinite(values)
+    found[known] = area(drum, values[known], flow)
+    return found
 
 
 def drum_of(study: Study) -> DrumFilter:

@@ -12,6 +12,7 @@ from filtercake.crystals.csd import FullAndTruncated, kept_volume
 from filtercake.errors import CrystallizerError
 from filtercake.filtration.resistance import kozeny_carman
 from filtercake.packing.cloud import box_length
+from filtercake.results.resistance_columns import ALWAYS, LAW, LAW_CI95
 from filtercake.statistics import pooled_spread
 from filtercake.study.config.published import Published
 from filtercake.study.config.study import Study
@@ -152,7 +153,8 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     """Tabulate porosity and resistance at the base material (paper, Table 4).
 
     For every distribution: the published simulation, our estimate by the paper's own count, the interior slab
-    (the answer), and the measurement; resistances by eq. 3 with the full distribution.
+    (the answer), and the measurement. Resistances are of the full distribution: by the study's law, with its own
+    interval, by the laws ``additive`` and ``carman`` beside it, and that of the paper's count by eq. 3 as in the paper.
     """
     rows = []
     for name, (full, _) in csds.items():
@@ -183,6 +185,7 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
                 ),
                 "resistance_m_kg": point["resistance_m_kg"],
                 "resistance_ci95_m_kg": point["resistance_ci95_m_kg"],
+                **{name: point[name] for name in (LAW, LAW_CI95, *(f"resistance_{law}_m_kg" for law in ALWAYS))},
                 "resistance_sauter_m_kg": point["resistance_sauter_m_kg"],
             }
         )

@@ -11,10 +11,11 @@ import pandas as pd
 
 from filtercake.crystals.csd import FullAndTruncated
 from filtercake.errors import PackingRejected
-from filtercake.filtration.resistance import carman_sauter, kozeny_carman
+from filtercake.filtration.resistance import ADDITIVE
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, read_record
+from filtercake.results.resistance_columns import LAW, LAW_CI95, RESISTANCES, resistance_columns
 from filtercake.statistics import half_width
 from filtercake.study.points import POINT_COLUMNS, Point
 from filtercake.units import MICROMETRE
@@ -22,9 +23,7 @@ from filtercake.units import MICROMETRE
 MEASURED = (
     "porosity",
     "porosity_paper_count",
-    "resistance_m_kg",
-    "resistance_sauter_m_kg",
-    "resistance_truncated_m_kg",
+    *RESISTANCES,
 )
 
 REPLICATE_COLUMNS = (
@@ -35,6 +34,8 @@ REPLICATE_COLUMNS = (
     "reason",
     "settled",
     *MEASURED,
+    LAW,
+    LAW_CI95,
     "porosity_from_floor",
     "soft_contact_compaction",
     "pull_off_over_weight",
@@ -57,6 +58,12 @@ SUMMARY_COLUMNS = (
     "porosity_paper_count_ci95",
     "resistance_m_kg",
     "resistance_ci95_m_kg",
+    LAW,
+    LAW_CI95,
+    "resistance_additive_m_kg",
+    "resistance_additive_ci95_m_kg",
+    "resistance_carman_m_kg",
+    "resistance_carman_ci95_m_kg",
     "resistance_sauter_m_kg",
     "resistance_sauter_ci95_m_kg",
     "resistance_truncated_m_kg",
@@ -67,13 +74,14 @@ SUMMARY_COLUMNS = (
 )
 
 
-def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, sphericity: float) -> dict[str, Any]:
+def replicate_row(
+    point: Point, packing: Packing, csd: FullAndTruncated, sphericity: float, law: str = ADDITIVE
+) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
     The resistance is that of the full distribution; that of the truncated one is kept for comparison.
     """
     found, record = measure(packing, point.scene), packing.diagnostics
-    (full, truncated), law = csd, (point.scene.density, sphericity)
     return {
         **point.row(),
         "replicate": record["replicate"],
@@ -83,9 +91,7 @@ def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, spheric
         "settled": record["settled"],
         "porosity": found.interior,
         "porosity_paper_count": found.paper_count,
-        "resistance_m_kg": kozeny_carman(found.interior, full, *law),
-        "resistance_sauter_m_kg": carman_sauter(found.interior, full, *law),
-        "resistance_truncated_m_kg": kozeny_carman(found.interior, truncated, *law),
+        **resistance_columns(law, found.interior, csd, point.scene.density, sphericity),
         "porosity_from_floor": found.from_floor,
         "soft_contact_compaction": found.compaction,
         "pull_off_over_weight": point.scene.pull_off_over_weight,
@@ -100,7 +106,12 @@ def replicate_row(point: Point, packing: Packing, csd: FullAndTruncated, spheric
 
 
 def replicate_rows(
-    point: Point, outcomes: Iterable[Outcome], folder: Path, csd: FullAndTruncated, sphericity: float
+    point: Point,
+    outcomes: Iterable[Outcome],
+    folder: Path,
+    csd: FullAndTruncated,
+    sphericity: float,
+    law: str = ADDITIVE,
 ) -> Iterator[dict[str, Any]]:
     """Measure a point's packings in its folder; a failed or damaged one is a row with a reason, blank but for that."""
     for outcome in outcomes:
@@ -108,26 +119,30 @@ def replicate_rows(
         if outcome.status == "ok":
             try:
                 packing = Packing.load(folder / f"r{outcome.replicate}.npz")
-                yield replicate_row(point, packing, csd, sphericity)
+                yield replicate_row(point, packing, csd, sphericity, law)
                 continue
             except PackingRejected as error:
                 reason = str(error)
         who = {"replicate": outcome.replicate, "seed": outcome.seed}
-        yield {**point.row(), **who, "status": "failed", "reason": reason, "settled": False}
+        yield {**point.row(), **who, "status": "failed", "reason": reason, "settled": False, LAW: law}
 
 
 def replicates_table(
-    points: Iterable[Point], packings: Path, csds: Mapping[str, FullAndTruncated], sphericity: float
+    points: Iterable[Point],
+    packings: Path,
+    csds: Mapping[str, FullAndTruncated],
+    sphericity: float,
+    law: str = ADDITIVE,
 ) -> pd.DataFrame:
     """Measure every packing of a study, ``REPLICATE_COLUMNS``.
 
-    ``packings`` holds one folder per point; ``sphericity`` is for the resistance law.
+    ``packings`` holds one folder per point; ``sphericity`` and ``law`` are the study's, for the resistance.
     """
     rows: list[dict[str, Any]] = []
     for point in points:
         folder = packings / point.name
         outcomes = [Outcome(**entry) for entry in read_record(folder / MANIFEST)["replicates"]]
-        rows += replicate_rows(point, outcomes, folder, csds[point.csd], sphericity)
+        rows += replicate_rows(point, outcomes, folder, csds[point.csd], sphericity, law)
     return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
 
 
@@ -146,7 +161,8 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
             row[column] = values.mean() if values.size else np.nan
             row[_interval_name(column)] = half_width(values)
         row["interval_reached"] = _reached(row["porosity_ci95"], row["porosity_ci95_target"])
-        for column in ("soft_contact_compaction", "pull_off_over_weight"):
+        row[LAW] = group.iloc[0][LAW]
+        for column in (LAW_CI95, "soft_contact_compaction", "pull_off_over_weight"):
             row[column] = good[column].mean()
         row["overlap_max"] = good["overlap_max"].max()
         rows.append(row)

@@ -15,6 +15,7 @@ from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size
 from filtercake.crystals.csd import CrystalSizeDistribution, read_csd, truncate
 from filtercake.crystals.size_laws import made
 from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
+from filtercake.filtration.resistance import RESISTANCE_LAWS, law_of
 from filtercake.packing.cloud import bed_for
 from filtercake.packing.scene import Scene
 from filtercake.study import limits
@@ -211,6 +212,7 @@ def check_study(values: Any, path: Path, *, packed: bool = True) -> LoadedStudy:
     if problems:  # nothing that is too large is looked into
         raise ConfigError(problems)
     problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
+    problems += _law_problems(model, str(path))
     csds: dict[str, LoadedCsd] = {}
     for name, csd in model.csds.items():
         try:
@@ -366,6 +368,16 @@ def _bed_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterab
                 "small crystals out of the packing (truncate_below_um), or give packing.particles"
             )
             yield Problem(file, *_source_of(name, model.csds[name]), allowed)
+
+
+def _law_problems(model: Study, file: str) -> Iterable[Problem]:
+    """Laws that need a Kozeny constant, where nothing says that it is solved on the study's packings."""
+    if law_of(model.resistance_law).needs_kozeny_constant:
+        usable = [law.name for law in RESISTANCE_LAWS.values() if not law.needs_kozeny_constant]
+        allowed = (
+            f"needs the flow solved in the study's packings, which a study cannot ask for; allowed: {', '.join(usable)}"
+        )
+        yield Problem(file, "resistance_law", repr(model.resistance_law), allowed)
 
 
 def _reference_problems(model: Study, file: str) -> Iterable[Problem]:

@@ -17,6 +17,7 @@ from filtercake.filtration.resistance import implied_porosity
 ROOT = Path(__file__).parents[3]
 STUDIES = ROOT / "config" / "studies"
 TINY = (ROOT / "config/test/calibration/tiny.yaml").read_text()
+CSV = ROOT / "config/test/tiny.csv"
 MEASUREMENTS = "resistances:\n  - {csd: bimodal, resistance_m_kg: VALUE, relative_uncertainty: 0.05, source: made up}\n"
 
 
@@ -54,6 +55,19 @@ def test_friction_follows_the_papers_advice(tmp_path: Path, resistance: str, fri
     found = load(tmp_path, TINY.replace("friction: 0\n", "").replace("rival_friction: [0.1]\n", ""), resistance)
     assert found.frictions == (friction,)
     assert (found.implied_porosity < 0.4) == (friction == 0.0)
+
+
+def test_the_study_s_law_says_what_a_resistance_implies(tmp_path: Path) -> None:
+    found = load(tmp_path)
+    (tmp_path / "study.yaml").write_text(found.study.path.read_text().replace("file: tiny.csv", f"file: {CSV}"))
+    (tmp_path / "law.yaml").write_text("resistance_law: carman\n" + (tmp_path / "study.yaml").read_text())
+    for name, law in (("study", "additive"), ("law", "carman")):
+        text = TINY.replace("../tiny.yaml", f"{name}.yaml").replace("tiny_measurements.yaml", "measured.yaml")
+        (tmp_path / "mine.yaml").write_text(text)
+        found = load_calibration(tmp_path / "mine.yaml", STUDIES)
+        full = found.study.csds["bimodal"].full
+        assert found.implied_porosity == pytest.approx(implied_porosity(1.4e9, full, 1180.0, law=law))
+        assert settings_of(found).resistance_law == law
 
 
 BOTH = MEASUREMENTS + MEASUREMENTS.partition("\n")[2].replace("bimodal", "from_file")

@@ -15,7 +15,7 @@ from filtercake.calibration.rounds import BATCHES, Candidate, Settings, Task, ch
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
 from filtercake.errors import CalibrationError
 from filtercake.filtration.drum_filter import DrumFilter, area
-from filtercake.filtration.resistance import kozeny_carman
+from filtercake.filtration.resistance import CARMAN, kozeny_carman, resistance
 from filtercake.packing.scene import Scene
 from filtercake.study.points import Point
 from filtercake.units import KILOJOULE_PER_M3
@@ -325,6 +325,14 @@ class TestPrediction:
             assert size == pytest.approx(float(area(drum, np.array([alpha]), 20.0 / 3600.0)[0]))
         assert row["porosity_low"] < row["porosity"] < row["porosity_high"]
         assert kozeny_carman(row["porosity_low"], CSDS["new"], 1180.0) == pytest.approx(row["resistance_high_m_kg"])
+
+    def test_by_another_law_the_same_resistance_is_another_porosity(self) -> None:
+        outcome, _ = TestOutcome().outcome()
+        names = study.prediction_points(settings(), candidates(), outcome.fit)
+        new = packed([c for c in candidates() if c.point.name in names])
+        (row,) = study.prediction_table(outcome, settings(resistance_law=CARMAN), new, CSDS).to_dict("records")
+        found = resistance(CARMAN, row["porosity_low"], CSDS["new"], 1180.0)
+        assert found == pytest.approx(row["resistance_high_m_kg"])
 
     def test_needs_packings(self) -> None:
         outcome, table = TestOutcome().outcome()

@@ -47,6 +47,14 @@ def refused(folder: Path, measured: str, study: str = STUDY) -> Problem:
     return problem
 
 
+def test_the_study_s_law_is_what_units_are_judged_by(tmp_path: Path) -> None:
+    assert load(tmp_path, VALUE, f"resistance_law: carman\n{STUDY}").implied_porosity == pytest.approx(0.324, abs=0.001)
+    off = VALUE.replace("3.5e9", "3.5")
+    by_carman, by_eq_3 = (refused(tmp_path, off, law + STUDY) for law in ("resistance_law: carman\n", ""))
+    assert "in 1e9 m/kg? (3.5e+09 gives 0.324)" in by_carman.allowed
+    assert "in 1e9 m/kg? (3.5e+09 gives 0.346)" in by_eq_3.allowed
+
+
 def test_right_units_pass(tmp_path: Path) -> None:
     assert load(tmp_path, TEST + VALUE).implied_porosity == pytest.approx(0.346, abs=0.001)
 

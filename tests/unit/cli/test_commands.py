@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import math
+import re
 import shutil
 from collections.abc import Iterator
 from itertools import chain
@@ -21,6 +22,7 @@ from filtercake.api.steps import load_packing
 from filtercake.cli import commands as cli
 from filtercake.cli.commands import build_parser, main
 from filtercake.errors import ConfigError, PackingRejected
+from filtercake.filtration.resistance import CARMAN_CONSTANT, CARMAN_CONSTANT_CI95, RESISTANCE_LAWS
 from filtercake.packing.pack import Outcome
 from filtercake.study.loading import load_study
 
@@ -103,15 +105,90 @@ def test_csd_in_words(capsys: Capture) -> None:
 
 
 def test_resistance_of_the_papers_table_4(capsys: Capture) -> None:
-    found = as_json(["resistance", "--porosity", "0.359", "--density-kg-m3", "1180", *PMMA], capsys)
-    assert found["resistance_m_kg"] == pytest.approx(3.06e9, rel=2e-3)
+    cake = ["--porosity", "0.359", "--density-kg-m3", "1180", *PMMA]
+    found = as_json(["resistance", "--law", "additive", *cake], capsys)
+    assert found["resistance_m_kg"] == found["resistance_additive_m_kg"] == pytest.approx(3.06e9, rel=2e-3)
     assert found["resistance_sauter_m_kg"] == pytest.approx(3.06e9 / 1.18, rel=5e-3)
     assert found["change_per_0p01_porosity"] == pytest.approx(-0.099, abs=1e-3)
 
 
 def test_resistance_takes_the_density_of_the_kinetics(capsys: Capture) -> None:
     found = as_json(["resistance", "--porosity", "0.293", *ALUM], capsys)
-    assert found["resistance_m_kg"] == pytest.approx(1.009e8, rel=5e-3)
+    assert found["resistance_additive_m_kg"] == pytest.approx(1.009e8, rel=5e-3)
+    assert found["resistance_m_kg"] == found["resistance_carman_m_kg"]
+
+
+CAKE = ["resistance", "--porosity", "0.36", "--density-kg-m3", "1180", *PMMA]
+SAUTER = 35_000.0**2 * 0.64 / (0.36**3 * 1180.0)
+"""Flow and sizes of that cake by hand: a resistance over its constant, m/kg."""
+
+
+def test_carman_is_the_law_that_is_not_asked_for(capsys: Capture) -> None:
+    found = as_json(CAKE, capsys)
+    assert (found["resistance_law"], found["resistance_ci95_m_kg"]) == ("carman", None)
+    assert found["resistance_m_kg"] == pytest.approx(CARMAN_CONSTANT * SAUTER)
+    assert found["resistance_law_ci95_m_kg"] == pytest.approx(CARMAN_CONSTANT_CI95 * SAUTER)
+    assert main(CAKE) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"resistance, carman +2.421e\+09 m/kg\nuncertainty of the law +1.424e\+08 m/kg \(95 %", printed)
+    assert "resistance, additive" in printed and "+-" not in printed
+
+
+def test_the_interval_of_a_porosity_goes_into_the_resistance(capsys: Capture) -> None:
+    found = as_json([*CAKE, "--porosity-ci95", "0.002"], capsys)
+    relative = found["resistance_ci95_m_kg"] / found["resistance_m_kg"]
+    assert relative == pytest.approx(0.2 * abs(found["change_per_0p01_porosity"]))
+    assert main([*CAKE, "--porosity-ci95", "0.002"]) == 0
+    assert "2.421e+09 +- 4.791e+07 m/kg (95 %)" in capsys.readouterr().out
+
+
+def test_a_solved_constant_gives_the_resistance_of_the_packing(capsys: Capture) -> None:
+    stokes = [*CAKE, "--law", "stokes", "--kozeny-constant", "168"]
+    found = as_json(stokes, capsys)
+    assert found["resistance_m_kg"] == pytest.approx(168.0 * SAUTER) and found["resistance_law_ci95_m_kg"] is None
+    assert main(stokes) == 0
+    assert re.search(r"uncertainty of the law +- m/kg", capsys.readouterr().out)
+    known = as_json([*stokes, "--kozeny-constant-ci95", "3"], capsys)
+    assert known["resistance_law_ci95_m_kg"] == pytest.approx(3.0 * SAUTER)
+
+
+def test_laws_are_listed(capsys: Capture) -> None:
+    listed = as_json(["resistance", "--list-laws"], capsys)["laws"]
+    assert [law["name"] for law in listed] == list(RESISTANCE_LAWS)
+    assert main(["resistance", "--list-laws"]) == 0
+    printed = capsys.readouterr().out
+    assert all(str(text) in printed for law in listed for text in law.values())
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--law", "carmen"], "--law = carmen: allowed: 'additive', 'carman', 'stokes'; did you mean carman?"),
+        (["--law", "stokes"], "--kozeny-constant: must be given with the law stokes"),
+        (["--kozeny-constant", "160"], "--kozeny-constant = 160: goes with the law stokes, not carman"),
+        (["--kozeny-constant-ci95", "3"], "--kozeny-constant-ci95 = 3: goes with the law stokes, not carman"),
+    ],
+)
+def test_a_law_is_asked_for_as_it_must_be(more: list[str], said: str, capsys: Capture) -> None:
+    assert said in complaint([*CAKE, *more], capsys)
+
+
+def test_packings_know_no_flow(capsys: Capture, tmp_path: Path) -> None:
+    words = ["pack", *BED, "--law", "stokes", "--output", str(tmp_path / "bed")]
+    assert "--law = stokes: needs the flow solved in the study's packings" in complaint(words, capsys)
+
+
+def test_a_law_decides_nothing_of_the_packings(packed: Path, capsys: Capture) -> None:
+    before = {path.name: path.read_bytes() for path in packed.glob("r*.npz")}
+    words = ["pack", *BED, "--replicates", "2", "--output", str(packed)]
+    carman, additive = as_json(words, capsys), as_json([*words, "--law", "additive"], capsys)
+    assert {path.name: path.read_bytes() for path in packed.glob("r*.npz")} == before
+    for found, law in ((carman, "carman"), (additive, "additive")):
+        assert found["resistance_law"] == law
+        assert found["resistance_m_kg"] == found[f"resistance_{law}_m_kg"]
+        assert found["resistance_ci95_m_kg"] == found[f"resistance_{law}_ci95_m_kg"]
+    relative = carman["resistance_law_ci95_m_kg"] / carman["resistance_m_kg"]
+    assert relative == pytest.approx(CARMAN_CONSTANT_CI95 / CARMAN_CONSTANT)
 
 
 def test_filter_area_and_its_inverse(capsys: Capture) -> None:

@@ -20,10 +20,11 @@ from filtercake.figures.selection import StudyData
 from filtercake.figures.style import save
 from filtercake.figures.truncation import class_edges
 from filtercake.filtration.drum_filter import area, medium_share, resistance_for_cake_share
-from filtercake.filtration.resistance import carman_sauter, kozeny_carman
+from filtercake.filtration.resistance import RESISTANCE_LAWS
 from filtercake.results.filter_design import drum_of, filter_design
 from filtercake.results.paper_tables import crystallizer_table
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
+from filtercake.results.resistance_columns import resistance_columns
 from filtercake.study.loading import LoadedStudy, load_study
 from filtercake.study.points import expand, points_table
 
@@ -49,13 +50,13 @@ def make(study: LoadedStudy, porosities: dict[str, list[float | None]] | None = 
     points = expand(study, lambda *_: "embedded")
     rows = []
     for point in points:
-        full = study.csds[point.csd].full
+        sizes = (study.csds[point.csd].full, study.csds[point.csd].truncated)
         for k, porosity in enumerate((porosities or {}).get(point.csd, POROSITIES)):
             row: dict[str, Any] = {**point.row(), "replicate": k, "status": "failed", "reason": "not settled"}
             if porosity is not None:
                 row |= {"status": "ok", "reason": "", "porosity": porosity, "porosity_paper_count": porosity}
-                row |= {"resistance_m_kg": kozeny_carman(porosity, full, 2450.0)}
-                row |= {"resistance_sauter_m_kg": carman_sauter(porosity, full, 2450.0), "wall_s": 1.0}
+                law = model.get("resistance_law", study.model.resistance_law)
+                row |= {**resistance_columns(law, porosity, sizes, 2450.0, 1.0), "wall_s": 1.0}
             rows.append(row)
     replicates = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
     csds = {name: (loaded.full, loaded.truncated) for name, loaded in study.csds.items()}
@@ -313,6 +314,22 @@ class TestResistanceAndArea:
         drum = drum_of(data.study)
         for drawn, alpha in zip(share[1:], (mean, mean + half, mean - half), strict=True):
             assert drawn == pytest.approx(100.0 * medium_share(drum, alpha))
+
+    @pytest.mark.parametrize(("law", "other"), [("additive", "carman"), ("carman", "additive")])
+    def test_the_other_law_stands_beside_ours(self, study: LoadedStudy, law: str, other: str) -> None:
+        data = make(study, resistance_law=law)
+        table = filter_design(data.study, data.csds, data.summary)
+        figure = draw("fig14_resistance_area", data)
+        columns = (f"resistance_{other}_m_kg", f"filter_area_{other}_m2")
+        for axes, column in zip(figure.axes[:2], columns, strict=True):
+            (line,) = marked(axes, "beside")
+            assert list(line.get_ydata()) == pytest.approx(sorted(table[column], reverse=True))
+        (line,) = marked(figure.axes[2], "beside")
+        share = 100.0 * medium_share(drum_of(study.model), np.array(sorted(table[columns[0]], reverse=True)))
+        assert list(line.get_ydata()) == pytest.approx(share)
+        said = texts(figure)
+        assert "by Carman instead of eq. 3 the area changes by −1" in said
+        assert f"resistances by {RESISTANCE_LAWS[law].title}" in said
 
     def test_published_values_stand_beside_ours(self, data: StudyData) -> None:
         resistance, filter_area, share = draw("fig14_resistance_area", data).axes

@@ -23,11 +23,12 @@ from filtercake.figures import cross_section, profile, style, trajectory
 from filtercake.figures.catalogue import FIGURES, draw
 from filtercake.figures.selection import StudyData
 from filtercake.figures.style import save
-from filtercake.filtration.resistance import carman_sauter, kozeny_carman
+from filtercake.filtration.resistance import ADDITIVE, CARMAN, kozeny_carman, resistance
 from filtercake.packing.porosity import slab_porosity
 from filtercake.packing.result import Packing
 from filtercake.packing.slab import Slab, bed_height, interior_slab
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
+from filtercake.results.resistance_columns import resistance_columns
 from filtercake.statistics import half_width
 from filtercake.study.config.study import Study
 
@@ -104,7 +105,9 @@ def spheres(replicate: int, csd: CrystalSizeDistribution) -> Packing:
     return Packing(position, radius, side * pitch, {"trajectory": settling})
 
 
-def replicate_rows(points: list[tuple[str, str, dict[str, float], list[float | None]]]) -> pd.DataFrame:
+def replicate_rows(
+    points: list[tuple[str, str, dict[str, float], list[float | None]]], law: str = ADDITIVE
+) -> pd.DataFrame:
     rows = []
     for name, csd, differs, porosities in points:
         for k, porosity in enumerate(porosities):
@@ -116,8 +119,7 @@ def replicate_rows(points: list[tuple[str, str, dict[str, float], list[float | N
                     "reason": "",
                     "porosity": porosity,
                     "porosity_paper_count": porosity + 0.007,
-                    "resistance_m_kg": kozeny_carman(porosity, CSDS[csd], 1180.0),
-                    "resistance_sauter_m_kg": carman_sauter(porosity, CSDS[csd], 1180.0),
+                    **resistance_columns(law, porosity, (CSDS[csd], CSDS[csd]), 1180.0, 1.0),
                     "wall_s": 1.0,
                 }
             rows.append(row)
@@ -125,7 +127,7 @@ def replicate_rows(points: list[tuple[str, str, dict[str, float], list[float | N
 
 
 def make(folder: Path, points: list[tuple[str, str, dict[str, float], list[float | None]]], **study: Any) -> StudyData:
-    replicates = replicate_rows(points)
+    replicates = replicate_rows(points, study.get("resistance_law", ADDITIVE))
     for name, csd, _, porosities in points:
         for k, porosity in enumerate(porosities):
             if porosity is not None:
@@ -311,8 +313,16 @@ class TestResistanceAgainstCohesion:
         assert x.tolist() == [0.0, 50.0]
         assert y.tolist() == [point["resistance_m_kg"] for point in points]
         assert half == pytest.approx([point["resistance_ci95_m_kg"] for point in points])
-        sauter = marked(axes, "sauter")[0].get_ydata()
-        assert sauter[:2].tolist() == [point["resistance_sauter_m_kg"] for point in points]
+        beside = marked(axes, "beside")[0].get_ydata()
+        assert beside[:2].tolist() == [point["resistance_carman_m_kg"] for point in points]
+
+    def test_the_law_is_named_and_the_other_stands_beside_it(self, data: StudyData, tmp_path: Path) -> None:
+        for found, own, other in (
+            (data, "eq. 3 (additive)", "Carman (Sauter mean)"),
+            (make(tmp_path, POINTS, resistance_law=CARMAN), "Carman (Sauter mean)", "eq. 3 (additive)"),
+        ):
+            said = texts(draw("fig10_resistance_vs_cohesion", found))
+            assert f"resistances by {own}" in said and f"{other}, same packings" in said
 
     def test_axis_is_logarithmic_and_its_unit_right(self, axes: Axes) -> None:
         assert axes.get_yscale() == "log"
@@ -361,6 +371,14 @@ class TestResistanceAgainstPorosity:
             x, y = curves[label].get_data()
             expected = [kozeny_carman(float(value), CSDS[csd], 1180.0) for value in x]
             assert len(x) > 50 and np.asarray(y) == pytest.approx(expected)
+
+    def test_another_law_is_drawn_and_named(self, tmp_path: Path) -> None:
+        figure = draw("fig08_resistance_vs_porosity", make(tmp_path, POINTS, resistance_law=CARMAN))
+        assert "curves: Carman (Sauter mean) with the full distribution" in texts(figure)
+        curves = {line.get_label(): line for line in figure.axes[0].get_lines()}
+        x, y = curves["coarse spheres"].get_data()
+        expected = [resistance(CARMAN, float(value), CSDS["coarse"], 1180.0) for value in x]
+        assert np.asarray(y) == pytest.approx(expected)
 
     def test_uses_the_full_distribution_not_the_truncated_one(self, data: StudyData) -> None:
         cut = dataclasses.replace(data, csds={**data.csds, "coarse": (CSDS["coarse"], CSDS["fine"])})

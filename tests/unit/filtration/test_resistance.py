@@ -9,8 +9,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from filtercake.crystals.crystallizer import crystal_size_distribution
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
-from filtercake.filtration.resistance import carman_sauter, implied_porosity, kozeny_carman, log_sensitivity
+from filtercake.filtration.resistance import (
+    ADDITIVE,
+    CARMAN,
+    CARMAN_CONSTANT,
+    CARMAN_CONSTANT_CI95,
+    KOZENY_CARMAN,
+    RESISTANCE_LAWS,
+    STOKES,
+    carman_sauter,
+    implied_porosity,
+    kozeny_carman,
+    law_of,
+    law_relative_ci95,
+    log_sensitivity,
+    resistance,
+)
 
 UM = 1e-6
 
@@ -141,3 +157,120 @@ def test_any_positive_resistance_implies_a_porosity(csd: CrystalSizeDistribution
     assert 0.0 <= found <= 1.0
     if 1e-6 < found < 1.0 - 1e-6:
         assert kozeny_carman(found, csd, 1180.0) == pytest.approx(10.0**exponent, rel=1e-8)
+
+
+# --- the registry ---------------------------------------------------------------------------------------------------
+
+CONSTANTS = {STOKES: 168.0}
+"""Kozeny constants of the laws that need one."""
+
+
+def by(law: str, porosity: float, csd: CrystalSizeDistribution, density: float = 1180.0, psi: float = 1.0) -> float:
+    return resistance(law, porosity, csd, density, psi, CONSTANTS.get(law))
+
+
+@pytest.mark.parametrize(
+    ("law", "constant", "sizes"),
+    [
+        # 20 and 50 um by halves: sum x/d^2 = 1.45e9 1/m2, sum x/d = 35 000 1/m
+        (ADDITIVE, 180.0, 1.45e9),
+        (CARMAN, 170.0, 35_000.0**2),
+        (STOKES, 168.0, 35_000.0**2),
+    ],
+)
+def test_each_law_by_hand(pmma, law: str, constant: float, sizes: float) -> None:
+    # (1 - 0.36) / (0.36^3 0.9^2 1180)
+    flow = 0.64 / (0.046656 * 0.81 * 1180.0)
+    assert by(law, 0.36, pmma(0.5), 1180.0, 0.9) == pytest.approx(constant * flow * sizes, rel=1e-12)
+    assert law_of(law).evaluate(0.36, pmma(0.5), 1180.0, 0.9, 168.0) == by(law, 0.36, pmma(0.5), 1180.0, 0.9)
+
+
+def test_the_laws_of_before_are_still_there(pmma) -> None:
+    csd = pmma(0.75)
+    assert kozeny_carman(0.4, csd, 1180.0, 0.8) == by(ADDITIVE, 0.4, csd, 1180.0, 0.8)
+    assert carman_sauter(0.4, csd, 1180.0, 0.8) == pytest.approx(
+        KOZENY_CARMAN / CARMAN_CONSTANT * by(CARMAN, 0.4, csd, 1180.0, 0.8), rel=1e-12
+    )
+
+
+def test_a_whole_crystallizer_s_product_is_one_and_a_half_times_180_over_carman_s_constant() -> None:
+    # b ~ exp(-L/a): sum x/d^2 = 1/(6 a^2) and sum x/d = 1/(3 a)
+    a = 58.417 * UM
+    exact = CrystalSizeDistribution(
+        np.array([4.0 * a]), np.array([1.0]), np.array([1.0 / (3.0 * a)]), np.array([1.0 / (6.0 * a**2)])
+    )
+    # the classes end at 15 a, beyond which lie 2e-4 of the volume
+    for csd, tolerance in ((exact, 1e-12), (crystal_size_distribution(a), 2e-4)):
+        ratio = by(ADDITIVE, 0.3, csd) / by(CARMAN, 0.3, csd)
+        assert ratio == pytest.approx(1.5 * KOZENY_CARMAN / CARMAN_CONSTANT, rel=tolerance)
+
+
+@given(porosities, st.integers(5, 500))
+def test_one_size_leaves_only_the_constants_apart(porosity: float, size: int) -> None:
+    csd = mixture([size * UM], [1.0])
+    ratio = by(ADDITIVE, porosity, csd) / by(CARMAN, porosity, csd)
+    assert ratio == pytest.approx(KOZENY_CARMAN / CARMAN_CONSTANT, rel=1e-12)
+
+
+@given(
+    st.sampled_from([*RESISTANCE_LAWS]), st.floats(0.01, 0.99), distributions(), st.floats(100, 1e4), st.floats(0.1, 1)
+)
+def test_a_resistance_implies_the_porosity_it_came_from(
+    law: str, porosity: float, csd: CrystalSizeDistribution, density: float, psi: float
+) -> None:
+    alpha = by(law, porosity, csd, density, psi)
+    assert implied_porosity(alpha, csd, density, psi, law, CONSTANTS.get(law)) == pytest.approx(porosity, rel=1e-9)
+
+
+def test_an_implied_porosity_is_by_eq_3_unless_said(pmma) -> None:
+    assert implied_porosity(by(ADDITIVE, 0.36, pmma(0.5)), pmma(0.5), 1180.0) == pytest.approx(0.36)
+    assert implied_porosity(by(ADDITIVE, 0.36, pmma(0.5)), pmma(0.5), 1180.0, law=CARMAN) < 0.345
+
+
+def test_a_law_without_its_constant_is_refused(pmma) -> None:
+    with pytest.raises(ValueError, match="stokes needs a kozeny_constant, solved on the packings"):
+        resistance(STOKES, 0.36, pmma(0.5), 1180.0)
+    with pytest.raises(ValueError, match="stokes needs a kozeny_constant"):
+        implied_porosity(1e9, pmma(0.5), 1180.0, law=STOKES)
+    for bad in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(ValueError, match=r"kozeny_constant .* is not positive"):
+            resistance(STOKES, 0.36, pmma(0.5), 1180.0, kozeny_constant=bad)
+
+
+def test_an_unknown_law_is_refused_with_the_nearest(pmma) -> None:
+    for call in (
+        lambda: resistance("carmen", 0.36, pmma(0.5), 1180.0),
+        lambda: implied_porosity(1e9, pmma(0.5), 1180.0, law="carmen"),
+        lambda: law_relative_ci95("carmen", pmma(0.5)),
+    ):
+        with pytest.raises(ValueError) as caught:
+            call()
+        said = "unknown resistance law 'carmen'; allowed: additive, carman, stokes; did you mean carman?"
+        assert str(caught.value) == said
+
+
+def test_carman_s_interval_is_that_of_its_constant(pmma) -> None:
+    assert law_relative_ci95(CARMAN, pmma(0.5)) == pytest.approx(CARMAN_CONSTANT_CI95 / CARMAN_CONSTANT)
+
+
+@given(distributions())
+def test_the_additive_law_s_interval_reaches_the_far_end_of_carman_s(csd: CrystalSizeDistribution) -> None:
+    additive, carman = by(ADDITIVE, 0.36, csd), by(CARMAN, 0.36, csd)
+    reach, half = (law_relative_ci95(law, csd) for law in (ADDITIVE, CARMAN))
+    assert additive * (1.0 - reach) == pytest.approx(carman * (1.0 - half))
+    if csd.size.size == 1:
+        assert reach == pytest.approx((KOZENY_CARMAN - CARMAN_CONSTANT + CARMAN_CONSTANT_CI95) / KOZENY_CARMAN)
+
+
+def test_a_solved_constant_brings_its_own_interval(pmma) -> None:
+    assert law_relative_ci95(STOKES, pmma(0.5), 0.018) == 0.018
+    assert math.isnan(law_relative_ci95(STOKES, pmma(0.5)))
+
+
+@pytest.mark.parametrize("name", RESISTANCE_LAWS)
+def test_each_law_says_what_it_is(name: str) -> None:
+    law = RESISTANCE_LAWS[name]
+    assert law.name == name and law.equation.startswith("alpha = ")
+    for text in (law.title, law.units, law.validity, law.accuracy, law.source):
+        assert text
+    assert law.constant is None or f"{law.constant:g} " in law.equation

@@ -56,6 +56,8 @@ def test_a_number_is_short(value: float, written: str) -> None:
         ("growth_rate_m_s", "growth rate (m/s)"),
         ("resistance_ci95_m_kg", "resistance (m/kg): half-width of the 95 % interval"),
         ("friction", "friction"),
+        ("resistance_law", "law of the resistance"),
+        ("resistance_law_ci95_m_kg", "half-width of the law's own 95 % interval (m/kg)"),
         ("classes", "classes"),
     ],
 )
@@ -130,6 +132,20 @@ def test_captions_hold_the_numbers_of_the_tables(made_up: StudyData, alum: Study
     row = alum.summary.iloc[0]
     assert words.with_interval(row["resistance_m_kg"], row["resistance_ci95_m_kg"], "m/kg") in caption
     assert "The drum filter needs" in front
+
+
+def test_both_parts_of_a_resistance_s_interval_are_said(alum: StudyData, tmp_path: Path) -> None:
+    caption, front = written(tmp_path, "fig14_resistance_area", captions.study_values(alum))
+    row = alum.summary.iloc[0]
+    assert f"<td>± {words.number(row['resistance_law_ci95_m_kg'], 2)} m/kg</td>" in front
+    for text in (caption, front):
+        assert "by eq. 3 (additive)" in text and "by the law itself" in text
+    assert "by Carman, −13 %" in caption
+
+
+def test_the_law_is_among_the_parameters(alum: StudyData) -> None:
+    table = pages.parameters(alum.study).set_index("parameter")
+    assert table.loc["law of the resistance", "value"] == "eq. 3 (additive)"
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from filtercake.errors import CrystallizerError, FilterError
-from filtercake.filtration.resistance import kozeny_carman
-from filtercake.results.filter_design import filter_design
+from filtercake.filtration.drum_filter import area
+from filtercake.filtration.resistance import law_relative_ci95, resistance
+from filtercake.results.filter_design import drum_of, filter_design
 from filtercake.results.paper_tables import (
     COMPARISON_COLUMNS,
     CRYSTALLIZER_COLUMNS,
@@ -23,11 +24,11 @@ from filtercake.results.paper_tables import (
     table4,
 )
 from filtercake.results.replicates import summarise
+from filtercake.results.resistance_columns import LAW, resistance_columns
 from filtercake.study.loading import LoadedStudy, load_study
 from filtercake.study.points import expand
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-OTHER_RESISTANCES = ("resistance_sauter_m_kg", "resistance_truncated_m_kg")
 
 
 @pytest.fixture(scope="module")
@@ -107,28 +108,60 @@ def test_a_study_without_a_crystallizer_has_no_table_of_it(pmma_study: LoadedStu
         crystallizer_table(pmma_study.model, {}, csds(pmma_study))
 
 
-def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> None:
+PRINTED = {
+    "tau_15min": (0.293, 3.44),
+    "tau_30min": (0.2925, 3.15),
+    "tau_45min": (0.2925, 3.00),
+    "tau_60min": (0.292, 2.905),
+}
+"""The paper's porosities of alum, and the filter areas that follow from them, m2."""
+
+
+def designed(alum_study: LoadedStudy, law: str) -> pd.DataFrame:
+    """Filters of cakes with the paper's porosities, and a spread of 1 % in resistance."""
     rows = []
-    printed = {"tau_15min": (0.293, 3.44), "tau_30min": (0.2925, 3.15), "tau_45min": (0.2925, 3.00)}
-    printed["tau_60min"] = (0.292, 2.905)
     for point in expand(alum_study, lambda *_: "embedded"):
-        porosity = printed[point.csd][0]
-        alpha = kozeny_carman(porosity, alum_study.csds[point.csd].full, 2450.0)
+        porosity = PRINTED[point.csd][0]
         for sign in (-1, 1):
             row = {**point.row(), "status": "ok", "porosity": porosity, "porosity_paper_count": porosity}
-            rows.append({**row, "resistance_m_kg": alpha * (1 + 0.01 * sign)})
+            columns = resistance_columns(law, porosity, csds(alum_study)[point.csd], 2450.0, 1.0)
+            scaled = {name: value * (1 + 0.01 * sign) if name != LAW else value for name, value in columns.items()}
+            rows.append({**row, **scaled})
     replicates = pd.DataFrame(rows)
-    for column in (*OTHER_RESISTANCES, "soft_contact_compaction", "pull_off_over_weight", "overlap_max", "wall_s"):
+    for column in ("soft_contact_compaction", "pull_off_over_weight", "overlap_max", "wall_s"):
         replicates[column] = 1.0
-    table = filter_design(alum_study.model, csds(alum_study), summarise(replicates)).set_index("csd")
+    model = alum_study.model.model_copy(update={"resistance_law": law})
+    return filter_design(model, csds(alum_study), summarise(replicates)).set_index("csd")
+
+
+def test_the_filter_by_the_paper_s_own_porosities(alum_study: LoadedStudy) -> None:
+    table = designed(alum_study, "additive")
     assert list(table["crystallizer_volume_m3"]) == pytest.approx([5, 10, 15, 20])
-    for name, (_, area) in printed.items():
+    for name, (_, published) in PRINTED.items():
         row = table.loc[name]
-        assert row["filter_area_m2"] == pytest.approx(area, rel=0.002)
+        assert row["filter_area_m2"] == pytest.approx(published, rel=0.002)
         assert row["filter_area_low_m2"] < row["filter_area_m2"] < row["filter_area_high_m2"]
         assert 0.50 < row["medium_share"] < 0.60
     # the paper's text gives the first and the last
     assert table["published_area_m2"].to_list() == pytest.approx([3.4, nan, nan, 2.9], nan_ok=True)
+
+
+@pytest.mark.parametrize("law", ["additive", "carman"])
+def test_the_filter_follows_the_study_s_law(alum_study: LoadedStudy, law: str) -> None:
+    table = designed(alum_study, law)
+    drum, flow = drum_of(alum_study.model), 20.0 / 3600.0
+    for name, (porosity, _) in PRINTED.items():
+        row, full = table.loc[name], alum_study.csds[name].full
+        alpha = {each: resistance(each, porosity, full, 2450.0) for each in ("additive", "carman")}
+        assert row["resistance_law"] == law and row["resistance_m_kg"] == pytest.approx(alpha[law])
+        half = alpha[law] * law_relative_ci95(law, full)
+        ends = [float(area(drum, value, flow)) for value in (alpha[law], alpha[law] - half, alpha[law] + half)]
+        columns = ("filter_area_m2", "filter_area_law_low_m2", "filter_area_law_high_m2")
+        assert [row[column] for column in columns] == pytest.approx(ends)
+        both = {each: float(area(drum, value, flow)) for each, value in alpha.items()}
+        assert (row["filter_area_additive_m2"], row["filter_area_carman_m2"]) == pytest.approx(tuple(both.values()))
+        assert row["area_change_by_carman"] == pytest.approx(both["carman"] / both["additive"] - 1.0)
+        assert -0.2 < row["area_change_by_carman"] < -0.1
 
 
 def test_a_study_without_a_filter_has_no_design(pmma_study: LoadedStudy) -> None:
@@ -144,11 +177,10 @@ def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:
         porosity = printed[point.csd][0] if point.scene.cohesion == 50e3 and point.scene.friction == 0 else 0.5
         if (point.scene.poisson_ratio, point.scene.restitution) != (0.2, 0.3):
             porosity = 0.6
-        rows.append({**point.row(), "status": "ok", "porosity": porosity - 0.01, "porosity_paper_count": porosity})
+        row = {**point.row(), "status": "ok", "porosity": porosity - 0.01, "porosity_paper_count": porosity}
+        rows.append({**row, **resistance_columns("carman", porosity - 0.01, csds(pmma_study)[point.csd], 1180.0, 1.0)})
     replicates = pd.DataFrame(rows)
     for column in (
-        "resistance_m_kg",
-        *OTHER_RESISTANCES,
         "soft_contact_compaction",
         "pull_off_over_weight",
         "overlap_max",
@@ -162,6 +194,15 @@ def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:
         assert table.loc[name, "porosity"] == pytest.approx(porosity - 0.01)
         assert table.loc[name, "resistance_paper_count_m_kg"] == pytest.approx(alpha, rel=0.005)
         assert table.loc[name, "resistance_published_m_kg"] == alpha
+        # the paper's own comparison is by eq. 3, whatever the study's law; both laws stand side by side
+        full = pmma_study.csds[name].full
+        assert table.loc[name, "resistance_law"] == "carman"
+        assert table.loc[name, "resistance_m_kg"] == table.loc[name, "resistance_carman_m_kg"]
+        for law in ("additive", "carman"):
+            own = resistance(law, porosity - 0.01, full, 1180.0)
+            assert table.loc[name, f"resistance_{law}_m_kg"] == pytest.approx(own)
+        relative = table.loc[name, "resistance_law_ci95_m_kg"] / table.loc[name, "resistance_m_kg"]
+        assert relative == pytest.approx(law_relative_ci95("carman", full))
     assert table.loc["pmma_25_75", "resistance_measured_m_kg"] == 1.48e9
 
 

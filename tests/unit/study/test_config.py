@@ -823,6 +823,37 @@ def test_a_wrong_crystallizer_is_named(tmp_path: Path, before: str, after: str, 
     assert any(problem.key == key and says in problem.allowed for problem in caught.value.problems), caught.value
 
 
+@pytest.mark.parametrize("law", ["additive", "carman"])
+def test_a_study_has_a_law_of_the_resistance(law: str, study_from: Callable[..., LoadedStudy], good_study: str) -> None:
+    assert study_from(f"{good_study}resistance_law: {law}\n").model.resistance_law == law
+    assert study_from(good_study).model.resistance_law == "additive"  # files of earlier versions keep their numbers
+
+
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        ("carmen", "allowed: 'additive', 'carman', 'stokes'; did you mean carman?"),
+        ("180", "must be a valid string"),
+        (
+            "stokes",
+            "needs the flow solved in the study's packings, which a study cannot ask for; allowed: additive, carman",
+        ),
+    ],
+)
+def test_an_unusable_law_is_refused(
+    law: str, says: str, study_from: Callable[..., LoadedStudy], good_study: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        study_from(f"{good_study}resistance_law: {law}\n")
+    (problem,) = caught.value.problems
+    assert (problem.key, problem.allowed) == ("resistance_law", says)
+
+
+@pytest.mark.parametrize("path", [*Path(__file__).parents[3].glob("config/[sb]*s/*.yaml")], ids=lambda path: path.stem)
+def test_studies_of_the_paper_say_that_theirs_is_eq_3(path: Path) -> None:
+    assert "\nresistance_law: additive" in path.read_text(encoding="utf-8")
+
+
 def test_residence_times_need_a_crystallizer(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     text = "csds: {a: {residence_time_min: 5}}\nmaterial: {}\nsweeps: [{residence_time_min: 3}]\n"

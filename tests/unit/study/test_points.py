@@ -17,11 +17,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filtercake.crystals.csd import from_table, mixture, to_table
-from filtercake.filtration.resistance import carman_sauter, kozeny_carman
+from filtercake.filtration.resistance import (
+    CARMAN,
+    CARMAN_CONSTANT,
+    CARMAN_CONSTANT_CI95,
+    KozenyConstant,
+    carman_sauter,
+    kozeny_carman,
+    resistance,
+)
 from filtercake.packing.pack import MANIFEST, Outcome, cloud_seed
 from filtercake.packing.result import Packing, write_json
 from filtercake.packing.scene import Scene, digest, stage_seed
 from filtercake.results.replicates import REPLICATE_COLUMNS, SUMMARY_COLUMNS, replicates_table, summarise
+from filtercake.results.resistance_columns import resistance_columns
 from filtercake.study.loading import LoadedStudy
 from filtercake.study.points import POINT_COLUMNS, Point, expand, points_table
 
@@ -282,6 +291,31 @@ def test_a_summary_by_hand() -> None:
     assert line["overlap_max"] == pytest.approx(0.003)
 
 
+def test_each_law_has_its_interval_over_the_packings_and_the_study_s_law_one_of_its_own() -> None:
+    csd, packed = mixture([20 * UM, 50 * UM], [0.5, 0.5]), mixture([50 * UM], [1.0])
+    porosities = (0.35, 0.36, 0.37)
+    columns = [resistance_columns("carman", value, (csd, packed), 1180.0, 1.0) for value in porosities]
+    (line,) = summarise(table(*(row("p", k, 0.36, **values) for k, values in enumerate(columns)))).to_dict("records")
+    for name in ("", "_additive", "_carman", "_sauter"):
+        values = [values[f"resistance{name}_m_kg"] for values in columns]
+        assert line[f"resistance{name}_m_kg"] == pytest.approx(np.mean(values))
+        half = 4.302653 * np.std(values, ddof=1) / np.sqrt(3)
+        assert line[f"resistance{name}_ci95_m_kg"] == pytest.approx(half, rel=1e-6)
+    relative = line["resistance_law_ci95_m_kg"] / line["resistance_m_kg"]
+    assert relative == pytest.approx(CARMAN_CONSTANT_CI95 / CARMAN_CONSTANT)
+
+
+def test_columns_of_a_cake_whose_flow_is_solved() -> None:
+    csd, packed = mixture([20 * UM, 50 * UM], [0.5, 0.5]), mixture([50 * UM], [1.0])
+    found = resistance_columns("stokes", 0.36, (csd, packed), 1180.0, 0.9, KozenyConstant(168.0, 0.02))
+    assert found["resistance_m_kg"] == pytest.approx(resistance("stokes", 0.36, csd, 1180.0, 0.9, 168.0))
+    assert found["resistance_truncated_m_kg"] == pytest.approx(resistance("stokes", 0.36, packed, 1180.0, 0.9, 168.0))
+    assert found["resistance_law_ci95_m_kg"] == pytest.approx(0.02 * found["resistance_m_kg"])
+    assert found["resistance_carman_m_kg"] == pytest.approx(resistance(CARMAN, 0.36, csd, 1180.0, 0.9))
+    with pytest.raises(ValueError, match="stokes needs a kozeny_constant"):
+        resistance_columns("stokes", 0.36, (csd, packed), 1180.0, 0.9)
+
+
 def test_failed_replicates_are_counted_and_left_out() -> None:
     found = summarise(table(row("p", 0, 0.35), row("p", 1, status="failed", reason="killed"), row("p", 2, 0.37)))
     (line,) = found.to_dict("records")
@@ -342,5 +376,18 @@ def test_replicates_are_measured_and_damaged_ones_are_rows_with_a_reason(points_
     assert good["resistance_truncated_m_kg"] == pytest.approx(kozeny_carman(cubic, packed, 1180.0, 0.9), rel=1e-10)
     assert (good["length_um"], good["bed_height_um"]) == (pytest.approx(160.0), pytest.approx(320.0))
     assert found.loc[1:, "porosity"].isna().all()
+    assert good["resistance_carman_m_kg"] == pytest.approx(resistance(CARMAN, cubic, csd, 1180.0, 0.9), rel=1e-10)
+    assert good["resistance_additive_m_kg"] == good["resistance_m_kg"]
+    assert found["resistance_law"].tolist() == ["additive"] * 3
+    by_carman = replicates_table([point], tmp_path, {"a": (csd, packed)}, 0.9, CARMAN)
+    first = by_carman.iloc[0]
+    assert first["resistance_m_kg"] == first["resistance_carman_m_kg"] == good["resistance_carman_m_kg"]
+    assert first["resistance_additive_m_kg"] == good["resistance_additive_m_kg"]
+    assert first["resistance_truncated_m_kg"] == pytest.approx(resistance(CARMAN, cubic, packed, 1180.0, 0.9))
+    half = first["resistance_m_kg"] * CARMAN_CONSTANT_CI95 / CARMAN_CONSTANT
+    assert first["resistance_law_ci95_m_kg"] == pytest.approx(half)
+    (line,) = summarise(by_carman).to_dict("records")
+    assert line["resistance_law"] == "carman" and line["resistance_law_ci95_m_kg"] == pytest.approx(half)
+    assert np.isnan(line["resistance_carman_ci95_m_kg"])  # one packing
     (line,) = summarise(found).to_dict("records")
     assert (line["n"], line["n_failed"]) == (1, 2)

@@ -6,13 +6,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from filtercake.filtration.resistance import ADDITIVE
 from filtercake.study.config.crystals import Crystallizer, Csd
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
 from filtercake.study.config.published import Published
 from filtercake.study.config.sweep import Sweep
-from filtercake.study.config.values import ENTRIES, LISTED, MOST_VALUES, TO_TEXT, Model, Name, PathText
+from filtercake.study.config.values import ENTRIES, LISTED, MOST_VALUES, TO_TEXT, LawName, Model, Name, PathText
 
 MOST_DISTRIBUTIONS = 200
 """Distributions of a study, the crystallizer's products among them."""
@@ -30,6 +31,11 @@ class Study(Model):
     crystallizer: Crystallizer | None = Field(default=None, description="Where the crystals come from.")
     filter: Filter | None = Field(default=None, description="Where the slurry goes; needs a crystallizer.")
     material: Material = Field(description="The crystals.")
+    resistance_law: LawName = Field(
+        default=ADDITIVE,
+        description="Law of the resistance: additive (the paper's eq. 3), carman (Sauter mean, lower for broad "
+        "distributions, nearer to the flow in packings), or stokes (flow solved in the packings).",
+    )
     packing: Packing = Field(default=Packing(), description="How the packings are made.")
     sweeps: Annotated[list[Sweep], Field(min_length=1, max_length=MOST_VALUES)] = Field(
         description="Blocks of points; their union is visited."

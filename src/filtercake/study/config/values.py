@@ -7,8 +7,10 @@ import re
 import unicodedata
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
+from filtercake.errors import did_you_mean
+from filtercake.filtration.resistance import RESISTANCE_LAWS
 from filtercake.study import limits
 from filtercake.units import NUMBER
 from filtercake.user_files import as_written
@@ -102,6 +104,14 @@ def _path(value: Any) -> Any:
     return value
 
 
+def _law(name: str) -> str:
+    """Refuse what no resistance law is called."""
+    if name not in RESISTANCE_LAWS:
+        known = ", ".join(map(repr, RESISTANCE_LAWS))
+        raise ValueError(f"allowed: {known}{did_you_mean(name, RESISTANCE_LAWS)}")
+    return name
+
+
 # the bounds stand before the conversion, or they are lost from the JSON schema
 TO_NUMBER = BeforeValidator(_number)
 TO_WHOLE = BeforeValidator(_whole)
@@ -117,6 +127,7 @@ PoissonRatio = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUM
 Restitution = Annotated[float, Field(ge=0.001, lt=1, allow_inf_nan=False), TO_NUMBER]
 Friction = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False), TO_NUMBER]
 Cohesion = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False), TO_NUMBER]
+LawName = Annotated[str, AfterValidator(_law), WithJsonSchema({"enum": [*RESISTANCE_LAWS], "type": "string"})]
 
 ResidenceTime = Annotated[float, Field(ge=0.001, le=100_000, allow_inf_nan=False), TO_NUMBER]
 
