@@ -36,7 +36,7 @@ ORDER: Final = 2.7
 ORDER_DOUBT: Final = 0.35
 """Share of the extrapolation that is doubtful: the power is 2 to 4."""
 ALIGNMENT: Final = 0.05
-"""Relative half-width, at the second lattice's default spacing, of what depends on where the nodes lie in one sphere."""
+"""Relative half-width, on the second lattice by default, of what depends on where the nodes lie in one sphere."""
 FEWEST_DIAMETERS: Final = 8.0
 """Nodes per Sauter mean diameter of the second lattice, however wide the pores are."""
 FREE_UNITS: Final = 2
@@ -281,7 +281,8 @@ def _units(length: float, porosity: float, sauter: float, accuracy: float) -> in
     if not FINEST_ACCURACY <= accuracy <= COARSEST_ACCURACY:
         raise FiltercakeError(f"accuracy = {accuracy:g}: must be {FINEST_ACCURACY:g} to {COARSEST_ACCURACY:g}")
     pore_radius = porosity * sauter / (6.0 * (1.0 - porosity))
-    spacing = min(pore_radius / PORE_NODES, sauter / FEWEST_DIAMETERS) * (accuracy / ACCURACY) ** (1.0 / ORDER)
+    widest = min(pore_radius / PORE_NODES, sauter / FEWEST_DIAMETERS)
+    spacing = widest * float((accuracy / ACCURACY) ** (1.0 / ORDER))
     return max(2, math.ceil(length / spacing / LEVELS[1]))
 
 
@@ -355,7 +356,7 @@ def _force(domain: Domain, lattice: Lattice) -> FloatArray:
     bed = (heights > 0.0) & (heights < domain.slab.upper + 2.0 * float(spheres.radius.max()))
     force = np.where(bed, surface**2 / np.maximum(1.0 - solid, 0.05) ** 3, 0.0)
     inside = (heights > domain.slab.lower) & (heights < domain.slab.upper)
-    return np.asarray(force / force[inside].mean(), dtype=np.float64)
+    return np.asarray(force / float(force[inside].mean()), dtype=np.float64)
 
 
 def _heights(domain: Domain, lattice: Lattice) -> FloatArray:

@@ -56,7 +56,7 @@ class Flow:
         threads: int = 1,
     ):
         self.lattice, self.steps = lattice, 0
-        self.threads = max(1, min(threads, numba.config.NUMBA_NUM_THREADS))
+        self.threads = max(1, min(threads, numba.get_num_threads()))
         self.viscosity = (relaxation_time - 0.5) / 3.0
         rate_odd = 1.0 / (0.5 + MAGIC / (relaxation_time - 0.5))
         self._rates = precision(1.0 / relaxation_time), precision(rate_odd)
@@ -340,7 +340,7 @@ def _prolong(
     velocities: IntArray,
     weights: FloatArray,
 ) -> None:
-    """Fill in the state that a coarser flow would leave: trilinear; at rest in spheres, pressure from the fluid only."""
+    """Fill in the state of a coarser flow: trilinear; at rest in spheres, pressure from the fluid only."""
     nz, ny, nx = number.shape
     mz, my, mx = coarse.shape
     directions, block = 19, 64
