@@ -132,20 +132,42 @@ def build(spheres: Spheres, across: int, offset: tuple[float, float, float] = (0
     radius = spheres.radius / spacing
     number = np.zeros((nz, ny, nx), dtype=np.int32)
     _mark_solids(number, centre, radius)
+    lattice = connect(number, spacing, wall_distance=1.0)
+    _measure_walls(number, lattice.wall, centre, radius, VELOCITIES)
+    return lattice
+
+
+def connect(number: NDArray[np.int32], spacing: float, *, wall_distance: float = 0.5) -> Lattice:
+    """Connect the fluid nodes of a periodic box.
+
+    Parameters
+    ----------
+    number : ndarray of int32, shape (nz, ny, nx)
+        -1 in solids, anything else in the fluid; receives the numbers of the fluid nodes.
+    spacing : float
+        Distance of nodes, m.
+    wall_distance : float
+        Where all walls are on the links that end in them, 0 to 1.
+
+    Raises
+    ------
+    FiltercakeError
+        If no node is fluid, or there are more than the index can name.
+    """
     fluid = _number_fluid(number)
     if fluid == 0:
-        raise FiltercakeError(f"no fluid between the spheres at {across} nodes across the box: use a finer lattice")
+        raise FiltercakeError(f"no fluid between the spheres on {number.shape[2]} nodes across: use a finer lattice")
     blocks = -(-fluid // BLOCK)
-    if blocks * DIRECTIONS * BLOCK > MOST_PLACES:
+    places = blocks * DIRECTIONS * BLOCK
+    if places > MOST_PLACES:
         raise FiltercakeError(
-            f"{fluid:,} fluid nodes: must be at most {MOST_PLACES // DIRECTIONS:,}; use a lower accuracy"
+            f"{fluid:,} fluid nodes: must be at most {MOST_PLACES // DIRECTIONS:,}; use less accuracy"
         )
-    source = np.empty(blocks * DIRECTIONS * BLOCK, dtype=np.int32)
-    wall = np.zeros(blocks * DIRECTIONS * BLOCK, dtype=np.int8)
+    source, wall = np.empty(places, dtype=np.int32), np.zeros(places, dtype=np.int8)
     layer = np.full(blocks * BLOCK, -1, dtype=np.int32)
-    _connect(number, source, wall, layer, VELOCITIES, OPPOSITE)
-    _measure_walls(number, wall, centre, radius, VELOCITIES)
-    return Lattice(spacing, (nz, ny, nx), fluid, source, wall, layer, number)
+    at_wall = np.int8(round((1.0 - 2.0 * wall_distance) * WALL_SCALE))
+    _connect(number, source, wall, layer, at_wall, VELOCITIES, OPPOSITE)
+    return Lattice(spacing, (number.shape[0], number.shape[1], number.shape[2]), fluid, source, wall, layer, number)
 
 
 @cached_njit
@@ -187,10 +209,11 @@ def _connect(
     source: NDArray[np.int32],
     wall: NDArray[np.int8],
     layer: NDArray[np.int32],
+    at_wall: np.int8,
     velocities: IntArray,
     opposite: IntArray,
 ) -> None:
-    """Fill in where each place streams from, and mark links to walls with the farthest distance."""
+    """Fill in where each place streams from, and mark links to walls."""
     nz, ny, nx = number.shape
     directions, block = 19, 64
     fluid = 0
@@ -208,7 +231,7 @@ def _connect(
                     back = number[(k - velocities[q, 2]) % nz, (j - velocities[q, 1]) % ny, (i - velocities[q, 0]) % nx]
                     if back < 0:
                         source[base + q * block] = base + q * block
-                        wall[base + opposite[q] * block] = -127
+                        wall[base + opposite[q] * block] = at_wall
                     else:
                         source[base + q * block] = (
                             (back // block) * directions * block + opposite[q] * block + back % block

@@ -1,7 +1,7 @@
 """Permeability of a bed or a periodic cell of spheres: Stokes flow at two resolutions, and how far it can be trusted.
 
 What counts is the pores' hydraulic radius in nodes, ``eps D / (6 (1 - eps))`` over the spacing: it chooses the
-lattices. The flow on the coarse one starts the one on the fine, and both are extrapolated to a spacing of zero.
+lattices. The flow on a coarse one starts the flow on the finer, and their difference says how far it can be trusted.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+import scipy
 
 from filtercake.errors import FiltercakeError
 from filtercake.packing.slab import Slab, interior_slab, why_too_thin
@@ -27,17 +28,19 @@ ACCURACY: Final = 0.02
 """Relative half-width of the numerical error that is asked for by default."""
 FINEST_ACCURACY: Final = 0.003
 COARSEST_ACCURACY: Final = 0.2
-PORE_NODES: Final = 1.0
+PORE_NODES: Final = 0.8
 """Pore radius in nodes of the second lattice at the default accuracy."""
 LEVELS: Final = (2, 3, 4, 6)
 """Nodes of the lattices in units of the box; the third and fourth only where the first two differ too much."""
-ORDER: Final = 2.7
-"""Power of the spacing with which the permeability converges between pore radii of 0.5 and 2 nodes."""
-ORDER_DOUBT: Final = 0.35
-"""Share of the extrapolation that is doubtful: the power is 2 to 4."""
-ALIGNMENT: Final = 0.05
+ORDER: Final = 2.0
+"""Power of the spacing with which errors fall."""
+DOUBT: Final = 0.5
+"""Share of the difference of the two finest lattices that is still in doubt."""
+REMAINDER: Final = 0.006
+"""Relative half-width, on the second lattice by default, of what both lattices have in common."""
+ALIGNMENT: Final = 0.03
 """Relative half-width, on the second lattice by default, of what depends on where the nodes lie in one sphere."""
-FEWEST_DIAMETERS: Final = 8.0
+FEWEST_DIAMETERS: Final = 6.0
 """Nodes per Sauter mean diameter of the second lattice, however wide the pores are."""
 FREE_UNITS: Final = 2
 """Layers of fluid under and over a bed, in units: six fine nodes."""
@@ -84,7 +87,7 @@ class Permeability:
     Attributes
     ----------
     permeability : float
-        m2, extrapolated to a spacing of zero.
+        m2, on the finest lattice.
     porosity, sauter_diameter : float
         Of the same slab with the same weights; overlapping spheres are their union, m.
     kozeny_constant : float
@@ -233,14 +236,13 @@ def cell_domain(position: FloatArray, radius: FloatArray, box: FloatArray, accur
 def solve(
     domain: Domain, accuracy: float = ACCURACY, *, threads: int = 1, say: Report = lambda _: None, picture: bool = False
 ) -> tuple[Permeability, Picture | None]:
-    """Solve the flow on two lattices, on more where they differ too much, and extrapolate.
+    """Solve the flow on two lattices, on more where they differ too much, and take the finest.
 
     With ``picture``, the speed in a cut is returned as well.
     """
     started = time.perf_counter()
     flow, levels, memory = _converge(domain, accuracy, threads, say)
-    spheres = _effective_spheres(domain)
-    value, resolution = _extrapolated(levels, spheres, accuracy)
+    spheres, value = _effective_spheres(domain), levels[-1].permeability
     pores = _Slabs(domain, flow)
     porosity, sauter = pores.means()
     result = Permeability(
@@ -248,7 +250,7 @@ def solve(
         porosity=porosity,
         sauter_diameter=sauter,
         kozeny_constant=_kozeny_constant(value, porosity, sauter),
-        resolution=resolution,
+        resolution=_resolution(levels, spheres, accuracy),
         convergence=levels[-1].convergence,
         slab=quantile() * SPREAD / math.sqrt(spheres),
         levels=tuple(levels),
@@ -268,10 +270,12 @@ def _converge(domain: Domain, accuracy: float, threads: int, say: Report) -> tup
         memory = max(memory, _check_memory(domain, across))
         coarse, flow = flow, _flow(domain, across, threads)
         if coarse is not None:
+            places = (np.arange(flow.force.size) + 0.5) * coarse.force.size / flow.force.size - 0.5
+            flow.push(np.interp(places, np.arange(coarse.force.size), coarse.force))
             flow.start_from(coarse)
         levels.append(_settle(domain, flow, accuracy))
         say(_line(levels[-1], time.perf_counter() - started))
-        if len(levels) > 1 and _extrapolated(levels, spheres, accuracy)[1] <= accuracy:
+        if len(levels) > 1 and _resolution(levels, spheres, accuracy) <= accuracy:
             break
     assert flow is not None
     return flow, levels, memory
@@ -290,19 +294,20 @@ def _kozeny_constant(permeability: float, porosity: float, sauter: float) -> flo
     return porosity**3 * sauter**2 / (permeability * (1.0 - porosity) ** 2)
 
 
-def _extrapolated(levels: list[Level], spheres: float, accuracy: float) -> tuple[float, float]:
-    """Permeability at a spacing of zero from the two finest lattices, and its relative half-width."""
+def _resolution(levels: list[Level], spheres: float, accuracy: float) -> float:
+    """Relative half-width of the finest lattice's permeability."""
     coarse, fine = levels[-2:]
-    step = (fine.permeability - coarse.permeability) / ((fine.across / coarse.across) ** ORDER - 1.0)
-    value = fine.permeability + step
-    finer = fine.across / levels[0].across * LEVELS[0] / LEVELS[1] * (ACCURACY / accuracy) ** (1.0 / ORDER)
-    return value, math.hypot(ORDER_DOUBT * step / value, ALIGNMENT / finer / math.sqrt(spheres))
+    difference = DOUBT * (fine.permeability / coarse.permeability - 1.0)
+    # the spacing over that of the second lattice at the default accuracy
+    spacing = LEVELS[1] / LEVELS[0] * levels[0].across / fine.across * (accuracy / ACCURACY) ** (1.0 / ORDER)
+    common = math.hypot(REMAINDER, ALIGNMENT / math.sqrt(spheres)) * spacing**ORDER
+    return math.hypot(difference, common)
 
 
 def _effective_spheres(domain: Domain) -> float:
-    """Spheres of the slab, each counting by its surface: as many equal ones would spread as much."""
+    """Return the spheres of the slab, each counting by its surface: as many equal ones would spread as much."""
     height, slab = domain.spheres.position[:, 2], domain.slab
-    inside = (height >= slab.lower) & (height <= slab.upper) | domain.periodic
+    inside = ((height >= slab.lower) & (height <= slab.upper)) | domain.periodic
     surface = domain.spheres.radius[inside] ** 2
     return float(surface.sum() ** 2 / np.sum(surface**2)) if surface.size else 1.0
 
@@ -318,16 +323,31 @@ def _settle(domain: Domain, flow: Flow, accuracy: float) -> Level:
     found = [slabs.permeability()]
     left = math.inf
     while not (flow.steps >= LEAST_STEPS and left < accuracy / 10.0):
+        if not domain.periodic:
+            _balance(flow, slabs.means()[1])
         flow.run(CHUNK)
         found.append(slabs.permeability())
         if (not found[-1] > 0.0 and flow.steps >= LEAST_STEPS) or flow.steps >= MOST_STEPS:
             nodes = f"{flow.steps} steps on {flow.lattice.fluid:,} nodes"
             raise FiltercakeError(f"the flow has not settled after {nodes}: k = {found[-1]:.4g} m2")
         left = _to_come(found)
-    sauter = slabs.means()[1]
     spacing = flow.lattice.spacing
-    across = flow.lattice.shape[2]
-    return Level(across, sauter / spacing, found[-1], left, flow.steps, flow.lattice.fluid)
+    return Level(flow.lattice.shape[2], slabs.means()[1] / spacing, found[-1], left, flow.steps, flow.lattice.fluid)
+
+
+def _balance(flow: Flow, sauter: float) -> None:
+    """Push less where more flows than on average, as the pressure would after thousands of steps."""
+    if flow.steps < 2 * CHUNK:
+        return
+    reach = max(1, int(0.5 * sauter / flow.lattice.spacing))
+    window = np.hanning(2 * reach + 3)[1:-1]
+    window /= window.sum()
+    pressure, _, flux = flow.layers()
+    gradient = flow.force - 0.5 * (np.roll(pressure, -1) - np.roll(pressure, 1))
+    gradient = np.maximum(scipy.ndimage.convolve1d(gradient, window, mode="wrap"), 0.0)
+    flux = scipy.ndimage.convolve1d(flux, window, mode="wrap")
+    mean = float(np.sum(flux * gradient) / gradient.sum())
+    flow.push(flow.force - gradient * np.clip(flux / mean - 1.0, -0.5, 0.5))
 
 
 def _to_come(found: list[float]) -> float:
@@ -340,38 +360,16 @@ def _to_come(found: list[float]) -> float:
 
 
 def _force(domain: Domain, lattice: Lattice) -> FloatArray:
-    """Force of each layer, 1 on average in the slab: in a cell the same everywhere, in a bed like the gradient to come.
-
-    What the layers resist goes as the square of their surface over the cube of their porosity; without that, the
-    pressure between layers would take thousands of steps to build up.
-    """
-    heights = _heights(domain, lattice)
-    if domain.periodic:
-        return np.ones(heights.size)
-    spheres, area = domain.spheres, float(domain.spheres.box[0]) ** 2
-    solid, surface = _layers(spheres.position, spheres.radius, heights)
-    reach = max(1, int(float(np.sum(spheres.radius**3) / np.sum(spheres.radius**2)) / lattice.spacing))
-    window = np.hanning(2 * reach + 3)[1:-1]
-    solid, surface = (np.convolve(values / area, window / window.sum(), "same") for values in (solid, surface))
-    bed = (heights > 0.0) & (heights < domain.slab.upper + 2.0 * float(spheres.radius.max()))
-    force = np.where(bed, surface**2 / np.maximum(1.0 - solid, 0.05) ** 3, 0.0)
-    inside = (heights > domain.slab.lower) & (heights < domain.slab.upper)
-    return np.asarray(force / float(force[inside].mean()), dtype=np.float64)
+    """Return a unit force for each layer, of a bed only where its spheres are."""
+    heights, spheres = _heights(domain, lattice), domain.spheres
+    top = float((spheres.position[:, 2] + spheres.radius).max())
+    bottom = float((spheres.position[:, 2] - spheres.radius).min())
+    return np.asarray(((heights > bottom) & (heights < top)) | domain.periodic, dtype=np.float64)
 
 
 def _heights(domain: Domain, lattice: Lattice) -> FloatArray:
     """Heights of the layers of nodes, m."""
-    return domain.spheres.bottom + (np.arange(lattice.shape[0]) + 0.5) * lattice.spacing
-
-
-def _layers(position: FloatArray, radius: FloatArray, heights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Cross-section (m2) and surface per height (m) of spheres at some heights, each of the heights' shape."""
-    solid, surface = np.zeros(heights.size), np.zeros(heights.size)
-    for z, r in zip(position[:, 2], radius, strict=True):
-        first, last = np.searchsorted(heights, (z - r, z + r))
-        solid[first:last] += np.pi * (r**2 - (heights[first:last] - z) ** 2)
-        surface[first:last] += 2.0 * np.pi * r
-    return solid, surface
+    return np.asarray(domain.spheres.bottom + (np.arange(lattice.shape[0]) + 0.5) * lattice.spacing)
 
 
 def _mean_pores(
@@ -395,20 +393,18 @@ class _Slabs:
     def __init__(self, domain: Domain, flow: Flow):
         self.domain, self.flow = domain, flow
         self.heights = _heights(domain, flow.lattice)
-        self.drive = np.cumsum(_force(domain, flow.lattice))
-        self.drive -= 0.5 * np.diff(self.drive, prepend=0.0)
         self.inside = np.flatnonzero((self.heights > domain.slab.lower) & (self.heights < domain.slab.upper))
 
     def permeability(self, layers: IntArray | None = None) -> float:
         """Return the permeability of some layers, of the whole slab by default, m2."""
-        pressure, flux = self.flow.layers()
+        speed = self.flow.layers()[1]
         chosen = self.inside if layers is None else layers
         if self.domain.periodic and layers is None:
-            gradient, velocity = 1.0, float(flux.mean())
+            gradient, velocity = 1.0, float(speed.mean())
         else:
             x = chosen - chosen.mean()
-            gradient = float(np.sum(x * (self.drive - pressure)[chosen]) / np.sum(x * x))
-            velocity = float(np.sum(flux[chosen] * self._weights(chosen)))
+            gradient = float(np.sum(x * self.flow.potential()[chosen]) / np.sum(x * x))
+            velocity = float(np.sum(speed[chosen] * self._weights(chosen)))
         return velocity * self.flow.viscosity / gradient * self.flow.lattice.spacing**2
 
     def means(self, layers: IntArray | None = None) -> tuple[float, float]:

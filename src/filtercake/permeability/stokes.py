@@ -1,8 +1,15 @@
 """Stokes flow on a lattice: linear two-relaxation-time lattice Boltzmann (D3Q19), as compiled kernels.
 
 The equilibrium is linear in the velocity, so that the steady state is Stokes flow whatever the force. What is stored is
-the deviation from rest. Walls reflect half a link away, moved to where they are by the even part of what is reflected
-(linear interpolated bounce-back; Ginzburg, Verhaeghe and d'Humieres, Commun. Comput. Phys. 3 (2008) 427). Steps come in
+the deviation from rest.
+
+Walls. A link that ends at a wall, q links away, sends back what went towards it, corrected by what has changed in it
+in the same collision: the change of the even part times ``1 - 2 q`` puts the wall where it is for a linear profile
+(Ginzburg, Verhaeghe and d'Humieres, Commun. Comput. Phys. 3 (2008) 427), that of the odd part, less the force's, times
+``(2 / rate - 1) (4 q^2 - 1)`` makes it exact for a parabola. What the corrections add is taken from what rests at the
+node: no mass is lost, so that the flux is the same through every plane, and the flow is stable.
+
+Steps come in
 pairs that work in place (the AA pattern of Bailey et al., ICPP 2009): the first one within each node, the second one
 between neighbours, every place being read and written by one node alone, so that threads do not change a bit of it.
 """
@@ -18,15 +25,17 @@ from numba import prange
 from numpy.typing import NDArray
 
 from filtercake.packing.compiled import cached_njit
-from filtercake.permeability.lattice import BLOCK, DIRECTIONS, VELOCITIES, WEIGHTS, Lattice
+from filtercake.permeability.lattice import BLOCK, DIRECTIONS, VELOCITIES, WALL_SCALE, WEIGHTS, Lattice
 from filtercake.units import FloatArray, IntArray
 
 Numbers = NDArray[Any]
 
 RELAXATION_TIME: Final = 1.25
-"""Of the even part; the flow does not depend on it, its stability does: at 1 some packings blow up slowly."""
+"""Of the even part; the flow does not depend on it, its stability does: at 1.1 it blows up."""
 MAGIC: Final = 3.0 / 16.0
-"""Product of the two relaxation times, each less one half: fixes where a wall of half-way bounce-back lies."""
+"""Product of the two relaxation times, each less one half: with it, straight walls lie where they are."""
+MOST_BEND: Final = 1.8
+"""Bound of ``4 q^2 - 1``, which walls more than 0.84 links away would exceed: beyond 2 the flow blows up."""
 
 
 class Flow:
@@ -61,13 +70,21 @@ class Flow:
         rate_odd = 1.0 / (0.5 + MAGIC / (relaxation_time - 0.5))
         self._rates = precision(1.0 / relaxation_time), precision(rate_odd)
         w0, w1, w2 = WEIGHTS[0], WEIGHTS[1], WEIGHTS[7]
-        self._constants = tuple(precision(c) for c in (1.0, 0.5, w0, w1, w2, 3.0 * w1, 3.0 * w2, 1.0 / 127.0))
-        self._force = np.where(lattice.layer >= 0, force[lattice.layer], 0.0).astype(precision)
+        self._constants = tuple(
+            precision(c) for c in (1.0, 0.5, w0, w1, w2, 3.0 * w1, 3.0 * w2, 1.0 / WALL_SCALE, MOST_BEND)
+        )
+        self._force = np.empty(lattice.layer.size, dtype=precision)
+        self.push(force)
         # the momentum of a fluid that has been pushed for half a step: rest, seen from the middle of the step
         self._f = np.zeros((lattice.blocks, DIRECTIONS, BLOCK), dtype=precision)
         for q in np.flatnonzero(VELOCITIES[:, 2]):
             self._f[:, q] = -1.5 * WEIGHTS[q] * VELOCITIES[q, 2] * self._force.reshape(-1, BLOCK)
         self._f = self._f.reshape(-1)
+
+    def push(self, force: FloatArray) -> None:
+        """Drive the fluid of each layer by a force (nz,)."""
+        self.force = force
+        self._force[:] = np.where(self.lattice.layer >= 0, force[self.lattice.layer], 0.0)
 
     def start_from(self, coarse: Flow) -> None:
         """Start from the flow on a coarser lattice of the same spheres and box, under the same force."""
@@ -95,12 +112,22 @@ class Flow:
                 numba.set_num_threads(before)
         self.steps += 2 * pairs
 
-    def layers(self) -> tuple[FloatArray, FloatArray]:
-        """Return the mean pressure in the fluid and the superficial velocity of each layer, each of shape (nz,)."""
+    def layers(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the mean pressure in the fluid, the superficial velocity and the flux of each layer, each (nz,).
+
+        The velocity is the sum over the layer's nodes; the flux is what crosses the faces on both sides of it, which no
+        wall distorts: the same in every layer once the flow is steady, if a little less exact.
+        """
         nz, ny, nx = self.lattice.shape
-        pressure, flux = np.zeros(nz), np.zeros(nz)
-        _sum_layers(self._f, self._force, self.lattice.layer, self.lattice.fluid, pressure, flux)
-        return pressure / np.maximum(self.lattice.fluid_per_layer(), 1), flux / (nx * ny)
+        sums = np.zeros((4, nz))
+        _sum_layers(self._f, self._force, self.lattice.source, self.lattice.layer, self.lattice.fluid, sums)
+        pressure, velocity, up, down = sums
+        flux = 0.5 * (up - down + np.roll(up - down, -1))
+        return pressure / np.maximum(self.lattice.fluid_per_layer(), 1), velocity / (nx * ny), flux / (nx * ny)
+
+    def potential(self) -> FloatArray:
+        """Return what drives the flow up to the middle of each layer: the force below it less the pressure, (nz,)."""
+        return np.asarray(np.cumsum(self.force) - 0.5 * self.force - self.layers()[0])
 
     def velocity(self) -> FloatArray:
         """Return the velocity of each fluid node, shape (fluid, 3)."""
@@ -128,7 +155,10 @@ def _collide(
 ) -> None:
     """Relax a block and write what goes along q to the place of its opposite, walls allowed for."""
     block = 64
-    one, half, w0, w1, w2, three_w1, three_w2, unit = constants
+    one, half, w0, w1, w2, three_w1, three_w2, unit, cap = constants
+    zero = one - one
+    two = one + one
+    bend = two / rate_odd - one
     push = one - half * rate_odd
     for i in range(block):
         f0 = f[base + i]
@@ -176,43 +206,98 @@ def _collide(
         gx = rate_odd * jx
         gy = rate_odd * jy
         gz = rate_odd * (jz + half * push_z) + push * push_z
-        f[base + i] = f0 - rate_even * (f0 - w0 * rho)
+        leak = zero
         even = rate_even * (half * s1 - w1 * rho)
         odd = half * (one - rate_odd) * d1 + three_w1 * (gx)
-        f[base + 2 * block + i] = half * s1 - even + odd + unit * wall[wbase + 1 * block + i] * even
-        f[base + 1 * block + i] = half * s1 - even - odd + unit * wall[wbase + 2 * block + i] * even
+        bent = bend * (half * d1 - odd)
+        c = unit * wall[wbase + 1 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 2 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 2 * block + i] = half * s1 - even + odd + there
+        f[base + 1 * block + i] = half * s1 - even - odd + back
         even = rate_even * (half * s3 - w1 * rho)
         odd = half * (one - rate_odd) * d3 + three_w1 * (gy)
-        f[base + 4 * block + i] = half * s3 - even + odd + unit * wall[wbase + 3 * block + i] * even
-        f[base + 3 * block + i] = half * s3 - even - odd + unit * wall[wbase + 4 * block + i] * even
+        bent = bend * (half * d3 - odd)
+        c = unit * wall[wbase + 3 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 4 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 4 * block + i] = half * s3 - even + odd + there
+        f[base + 3 * block + i] = half * s3 - even - odd + back
         even = rate_even * (half * s5 - w1 * rho)
         odd = half * (one - rate_odd) * d5 + three_w1 * (gz)
-        f[base + 6 * block + i] = half * s5 - even + odd + unit * wall[wbase + 5 * block + i] * even
-        f[base + 5 * block + i] = half * s5 - even - odd + unit * wall[wbase + 6 * block + i] * even
+        bent = bend * (half * d5 - odd + three_w1 * push_z)
+        c = unit * wall[wbase + 5 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 6 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 6 * block + i] = half * s5 - even + odd + there
+        f[base + 5 * block + i] = half * s5 - even - odd + back
         even = rate_even * (half * s7 - w2 * rho)
         odd = half * (one - rate_odd) * d7 + three_w2 * (gx + gy)
-        f[base + 8 * block + i] = half * s7 - even + odd + unit * wall[wbase + 7 * block + i] * even
-        f[base + 7 * block + i] = half * s7 - even - odd + unit * wall[wbase + 8 * block + i] * even
+        bent = bend * (half * d7 - odd)
+        c = unit * wall[wbase + 7 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 8 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 8 * block + i] = half * s7 - even + odd + there
+        f[base + 7 * block + i] = half * s7 - even - odd + back
         even = rate_even * (half * s9 - w2 * rho)
         odd = half * (one - rate_odd) * d9 + three_w2 * (gx - gy)
-        f[base + 10 * block + i] = half * s9 - even + odd + unit * wall[wbase + 9 * block + i] * even
-        f[base + 9 * block + i] = half * s9 - even - odd + unit * wall[wbase + 10 * block + i] * even
+        bent = bend * (half * d9 - odd)
+        c = unit * wall[wbase + 9 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 10 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 10 * block + i] = half * s9 - even + odd + there
+        f[base + 9 * block + i] = half * s9 - even - odd + back
         even = rate_even * (half * s11 - w2 * rho)
         odd = half * (one - rate_odd) * d11 + three_w2 * (gx + gz)
-        f[base + 12 * block + i] = half * s11 - even + odd + unit * wall[wbase + 11 * block + i] * even
-        f[base + 11 * block + i] = half * s11 - even - odd + unit * wall[wbase + 12 * block + i] * even
+        bent = bend * (half * d11 - odd + three_w2 * push_z)
+        c = unit * wall[wbase + 11 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 12 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 12 * block + i] = half * s11 - even + odd + there
+        f[base + 11 * block + i] = half * s11 - even - odd + back
         even = rate_even * (half * s13 - w2 * rho)
         odd = half * (one - rate_odd) * d13 + three_w2 * (gx - gz)
-        f[base + 14 * block + i] = half * s13 - even + odd + unit * wall[wbase + 13 * block + i] * even
-        f[base + 13 * block + i] = half * s13 - even - odd + unit * wall[wbase + 14 * block + i] * even
+        bent = bend * (half * d13 - odd - three_w2 * push_z)
+        c = unit * wall[wbase + 13 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 14 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 14 * block + i] = half * s13 - even + odd + there
+        f[base + 13 * block + i] = half * s13 - even - odd + back
         even = rate_even * (half * s15 - w2 * rho)
         odd = half * (one - rate_odd) * d15 + three_w2 * (gy + gz)
-        f[base + 16 * block + i] = half * s15 - even + odd + unit * wall[wbase + 15 * block + i] * even
-        f[base + 15 * block + i] = half * s15 - even - odd + unit * wall[wbase + 16 * block + i] * even
+        bent = bend * (half * d15 - odd + three_w2 * push_z)
+        c = unit * wall[wbase + 15 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 16 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 16 * block + i] = half * s15 - even + odd + there
+        f[base + 15 * block + i] = half * s15 - even - odd + back
         even = rate_even * (half * s17 - w2 * rho)
         odd = half * (one - rate_odd) * d17 + three_w2 * (gy - gz)
-        f[base + 18 * block + i] = half * s17 - even + odd + unit * wall[wbase + 17 * block + i] * even
-        f[base + 17 * block + i] = half * s17 - even - odd + unit * wall[wbase + 18 * block + i] * even
+        bent = bend * (half * d17 - odd - three_w2 * push_z)
+        c = unit * wall[wbase + 17 * block + i]
+        there = c * even + min(c * (c - two), cap) * bent
+        c = unit * wall[wbase + 18 * block + i]
+        back = c * even - min(c * (c - two), cap) * bent
+        leak += there + back
+        f[base + 18 * block + i] = half * s17 - even + odd + there
+        f[base + 17 * block + i] = half * s17 - even - odd + back
+        f[base + i] = f0 - rate_even * (f0 - w0 * rho) - leak
 
 
 @cached_njit(fastmath=True)
@@ -296,20 +381,31 @@ def advance_together(
 
 @cached_njit
 def _sum_layers(
-    f: Numbers, force: Numbers, layer: NDArray[np.int32], fluid: int, pressure: Any, flux: FloatArray
+    f: Numbers,
+    force: Numbers,
+    source: NDArray[np.int32],
+    layer: NDArray[np.int32],
+    fluid: int,
+    sums: FloatArray,
 ) -> None:
-    directions, block = 19, 64
+    """Add up pressure, velocity, and what came into each layer through its lower face from below and from above."""
+    directions, block, nz = 19, 64, sums.shape[1]
     for n in range(fluid):
         base = (n // block) * directions * block + n % block
-        rho = 0.0
+        k = layer[n]
+        sums[1, k] += 0.5 * force[n]
         for q in range(directions):
-            rho += f[base + q * block]
-        up = f[base + 5 * block] + f[base + 11 * block] + f[base + 14 * block]
-        up += f[base + 15 * block] + f[base + 18 * block]
-        down = f[base + 6 * block] + f[base + 12 * block] + f[base + 13 * block]
-        down += f[base + 16 * block] + f[base + 17 * block]
-        pressure[layer[n]] += rho / 3.0
-        flux[layer[n]] += up - down + 0.5 * force[n]
+            place = base + q * block
+            value = f[place]
+            sums[0, k] += value / 3.0
+            if q == 5 or q == 11 or q == 14 or q == 15 or q == 18:
+                sums[1, k] += value
+                if source[place] != place:
+                    sums[2, k] += value
+            elif q == 6 or q == 12 or q == 13 or q == 16 or q == 17:
+                sums[1, k] -= value
+                if source[place] != place:
+                    sums[3, (k + 1) % nz] += value
 
 
 @cached_njit
