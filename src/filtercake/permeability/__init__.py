@@ -1,0 +1,1 @@
+"""Permeability of a packing: Stokes flow solved through its pores, and what follows for the Kozeny constant."""

@@ -1,0 +1,468 @@
+"""Permeability of a bed or a periodic cell of spheres: Stokes flow at two resolutions, and how far it can be trusted.
+
+What counts is the pores' hydraulic radius in nodes, ``eps D / (6 (1 - eps))`` over the spacing: it chooses the
+lattices. The flow on a coarse one starts the flow on the finer, and their difference says how far it can be trusted.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import scipy
+
+from filtercake.errors import FiltercakeError
+from filtercake.packing.slab import Slab, interior_slab, why_too_thin
+from filtercake.permeability.lattice import Lattice, Spheres, build, bytes_needed
+from filtercake.permeability.stokes import Flow
+from filtercake.statistics import quantile
+from filtercake.units import FloatArray, IntArray, duration
+
+ACCURACY: Final = 0.02
+"""Relative half-width of the numerical error that is asked for by default."""
+FINEST_ACCURACY: Final = 0.003
+COARSEST_ACCURACY: Final = 0.2
+PORE_NODES: Final = 0.8
+"""Pore radius in nodes of the second lattice at the default accuracy."""
+LEVELS: Final = (2, 3, 4, 6)
+"""Nodes of the lattices in units of the box; the third and fourth only where the first two differ too much."""
+ORDER: Final = 2.0
+"""Power of the spacing with which errors fall."""
+DOUBT: Final = 0.5
+"""Share of the difference of the two finest lattices that is still in doubt."""
+REMAINDER: Final = 0.006
+"""Relative half-width, on the second lattice by default, of what both lattices have in common."""
+ALIGNMENT: Final = 0.03
+"""Relative half-width, on the second lattice by default, of what depends on where the nodes lie in one sphere."""
+FEWEST_DIAMETERS: Final = 6.0
+"""Nodes per Sauter mean diameter of the second lattice, however wide the pores are."""
+FREE_UNITS: Final = 2
+"""Layers of fluid under and over a bed, in units: six fine nodes."""
+CHUNK: Final = 50
+"""Steps between two looks."""
+LEAST_STEPS: Final = 150
+MOST_STEPS: Final = 6000
+SPREAD: Final = 0.35
+"""Relative standard deviation of the Kozeny constant of packings of one kind, times the root of their spheres."""
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Level:
+    """The flow on one lattice.
+
+    Attributes
+    ----------
+    across : int
+        Nodes along the side of the box.
+    diameters_per_spacing : float
+        Sauter mean diameter over the spacing.
+    permeability : float
+        m2.
+    convergence : float
+        Relative change still to come when it was stopped.
+    steps, nodes : int
+        Time steps, and fluid nodes.
+    """
+
+    across: int
+    diameters_per_spacing: float
+    permeability: float
+    convergence: float
+    steps: int
+    nodes: int
+
+
+@dataclass(frozen=True)
+class Permeability:
+    """Permeability of a packing, and its error budget: relative 95 % half-widths.
+
+    Attributes
+    ----------
+    permeability : float
+        m2, on the finest lattice.
+    porosity, sauter_diameter : float
+        Of the same slab with the same weights; overlapping spheres are their union, m.
+    kozeny_constant : float
+        A of ``k = eps^3 D^2 / (A (1 - eps)^2)``, D the Sauter mean diameter.
+    resolution, convergence : float
+        What the lattice, and stopping, leave open for this very packing.
+    slab : float
+        How far the constant of one such packing is from that of a large one, by the number of its spheres.
+    levels : tuple of Level
+        Coarse to fine.
+    seconds, memory_bytes : float
+        What it took.
+    """
+
+    permeability: float
+    porosity: float
+    sauter_diameter: float
+    kozeny_constant: float
+    resolution: float
+    convergence: float
+    slab: float
+    levels: tuple[Level, ...]
+    seconds: float = 0.0
+    memory_bytes: float = 0.0
+
+    @property
+    def numerical_ci95(self) -> float:
+        """Relative half-width for this very packing."""
+        return math.hypot(self.resolution, self.convergence)
+
+    @property
+    def relative_ci95(self) -> float:
+        """Relative half-width for a large packing of its kind."""
+        return math.hypot(self.numerical_ci95, self.slab)
+
+    def resistance(self, density: float) -> float:
+        """Specific cake resistance ``1 / (k rho (1 - eps))`` of these spheres, m/kg; density in kg/m3."""
+        return 1.0 / (self.permeability * density * (1.0 - self.porosity))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Speed in an upright cut through the middle of the packing.
+
+    Attributes
+    ----------
+    speed : ndarray, shape (nz, nx)
+        Over the superficial velocity; nan in spheres.
+    spacing, bottom : float
+        Distance of nodes and height of the lowest, m.
+    """
+
+    speed: FloatArray
+    spacing: float
+    bottom: float
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Spheres in their box, and the slab of it that is measured; ``units`` of the box's side set the lattices."""
+
+    spheres: Spheres
+    slab: Slab
+    units: int
+    periodic: bool
+
+
+def measure_bed(
+    position: FloatArray,
+    radius: FloatArray,
+    length: float,
+    *,
+    accuracy: float = ACCURACY,
+    threads: int = 1,
+    say: Report = lambda _: None,
+) -> Permeability:
+    """Solve the flow through a settled bed and return the permeability of its interior slab, upwards.
+
+    A few layers of fluid lie under and over the bed; the force drives the bed alone, shaped like the local gradient,
+    and the permeability follows from the slope of the pressure in the slab.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n, 3)
+        Centres, m, floor at z = 0; x and y periodic.
+    radius : ndarray, shape (n,)
+        Radii, m.
+    length : float
+        Side of the periodic box, m.
+    accuracy : float
+        Relative half-width of the numerical error asked for, 0.003 to 0.2.
+    threads : int
+        Threads.
+    say : callable
+        Receives a line per lattice.
+
+    Raises
+    ------
+    FiltercakeError
+        If the bed is too shallow, the accuracy out of range or out of reach of the memory, or the flow does not settle.
+    """
+    return solve(bed_domain(position, radius, length, accuracy), accuracy, threads=threads, say=say)[0]
+
+
+def measure_cell(
+    position: FloatArray,
+    radius: FloatArray,
+    box: FloatArray,
+    *,
+    accuracy: float = ACCURACY,
+    threads: int = 1,
+    say: Report = lambda _: None,
+) -> Permeability:
+    """Solve the flow along z through a cell that is periodic in all directions; as :func:`measure_bed`.
+
+    The sides ``box`` (3,), m, must be equal, or the second and third whole multiples of the lattices' spacings.
+    """
+    return solve(cell_domain(position, radius, box, accuracy), accuracy, threads=threads, say=say)[0]
+
+
+def bed_domain(position: FloatArray, radius: FloatArray, length: float, accuracy: float = ACCURACY) -> Domain:
+    """Put a bed into a box with free layers; parameters and errors as those of :func:`measure_bed`."""
+    slab = interior_slab(position, radius)
+    thin = why_too_thin(slab, radius)
+    if thin:
+        raise FiltercakeError(thin)
+    heights = np.linspace(slab.lower, slab.upper, 201)
+    porosity, sauter = _mean_pores(position, radius, length**2, heights, np.ones(heights.size))
+    units = _units(length, porosity, sauter, accuracy)
+    unit = length / units
+    bottom, top = float((position[:, 2] - radius).min()), float((position[:, 2] + radius).max())
+    layers = math.ceil((top - bottom) / unit) + 2 * FREE_UNITS
+    box = np.array([length, length, layers * unit])
+    return Domain(Spheres(position, radius, box, bottom - FREE_UNITS * unit), slab, units, periodic=False)
+
+
+def cell_domain(position: FloatArray, radius: FloatArray, box: FloatArray, accuracy: float = ACCURACY) -> Domain:
+    """Take a periodic cell as it is; parameters and errors as those of :func:`measure_cell`."""
+    volume = np.pi / 6.0 * (2.0 * radius) ** 3
+    sauter = float(volume.sum() / (volume / (2.0 * radius)).sum())
+    porosity = max(1.0 - float(volume.sum() / np.prod(box)), 0.05)
+    units = _units(float(box[0]), porosity, sauter, accuracy)
+    return Domain(Spheres(position, radius, np.asarray(box)), Slab(0.0, float(box[2])), units, periodic=True)
+
+
+def solve(
+    domain: Domain, accuracy: float = ACCURACY, *, threads: int = 1, say: Report = lambda _: None, picture: bool = False
+) -> tuple[Permeability, Picture | None]:
+    """Solve the flow on two lattices, on more where they differ too much, and take the finest.
+
+    With ``picture``, the speed in a cut is returned as well.
+    """
+    started = time.perf_counter()
+    flow, levels, memory = _converge(domain, accuracy, threads, say)
+    spheres, value = _effective_spheres(domain), levels[-1].permeability
+    pores = _Slabs(domain, flow)
+    porosity, sauter = pores.means()
+    result = Permeability(
+        permeability=value,
+        porosity=porosity,
+        sauter_diameter=sauter,
+        kozeny_constant=_kozeny_constant(value, porosity, sauter),
+        resolution=_resolution(levels, spheres, accuracy),
+        convergence=levels[-1].convergence,
+        slab=quantile() * SPREAD / math.sqrt(spheres),
+        levels=tuple(levels),
+        seconds=time.perf_counter() - started,
+        memory_bytes=memory,
+    )
+    return result, _cut(domain, flow) if picture else None
+
+
+def _converge(domain: Domain, accuracy: float, threads: int, say: Report) -> tuple[Flow, list[Level], float]:
+    """Solve on finer and finer lattices; return the last flow, what each found, and the most memory taken, bytes."""
+    started, levels, memory = time.perf_counter(), list[Level](), 0.0
+    spheres = _effective_spheres(domain)
+    flow: Flow | None = None
+    for multiple in LEVELS:
+        across = domain.units * multiple
+        memory = max(memory, _check_memory(domain, across))
+        coarse, flow = flow, _flow(domain, across, threads)
+        if coarse is not None:
+            places = (np.arange(flow.force.size) + 0.5) * coarse.force.size / flow.force.size - 0.5
+            flow.push(np.interp(places, np.arange(coarse.force.size), coarse.force))
+            flow.start_from(coarse)
+        levels.append(_settle(domain, flow, accuracy))
+        say(_line(levels[-1], time.perf_counter() - started))
+        if len(levels) > 1 and _resolution(levels, spheres, accuracy) <= accuracy:
+            break
+    assert flow is not None
+    return flow, levels, memory
+
+
+def _units(length: float, porosity: float, sauter: float, accuracy: float) -> int:
+    if not FINEST_ACCURACY <= accuracy <= COARSEST_ACCURACY:
+        raise FiltercakeError(f"accuracy = {accuracy:g}: must be {FINEST_ACCURACY:g} to {COARSEST_ACCURACY:g}")
+    pore_radius = porosity * sauter / (6.0 * (1.0 - porosity))
+    widest = min(pore_radius / PORE_NODES, sauter / FEWEST_DIAMETERS)
+    spacing = widest * float((accuracy / ACCURACY) ** (1.0 / ORDER))
+    return max(2, math.ceil(length / spacing / LEVELS[1]))
+
+
+def _kozeny_constant(permeability: float, porosity: float, sauter: float) -> float:
+    return porosity**3 * sauter**2 / (permeability * (1.0 - porosity) ** 2)
+
+
+def _resolution(levels: list[Level], spheres: float, accuracy: float) -> float:
+    """Relative half-width of the finest lattice's permeability."""
+    coarse, fine = levels[-2:]
+    difference = DOUBT * (fine.permeability / coarse.permeability - 1.0)
+    # the spacing over that of the second lattice at the default accuracy
+    spacing = LEVELS[1] / LEVELS[0] * levels[0].across / fine.across * (accuracy / ACCURACY) ** (1.0 / ORDER)
+    common = math.hypot(REMAINDER, ALIGNMENT / math.sqrt(spheres)) * spacing**ORDER
+    return math.hypot(difference, common)
+
+
+def _effective_spheres(domain: Domain) -> float:
+    """Return the spheres of the slab, each counting by its surface: as many equal ones would spread as much."""
+    height, slab = domain.spheres.position[:, 2], domain.slab
+    inside = ((height >= slab.lower) & (height <= slab.upper)) | domain.periodic
+    surface = domain.spheres.radius[inside] ** 2
+    return float(surface.sum() ** 2 / np.sum(surface**2)) if surface.size else 1.0
+
+
+def _flow(domain: Domain, across: int, threads: int) -> Flow:
+    lattice = build(domain.spheres, across)
+    return Flow(lattice, _force(domain, lattice), threads=threads)
+
+
+def _settle(domain: Domain, flow: Flow, accuracy: float) -> Level:
+    """Run until what is still to come hardly matters."""
+    slabs = _Slabs(domain, flow)
+    found = [slabs.permeability()]
+    left = math.inf
+    while not (flow.steps >= LEAST_STEPS and left < accuracy / 10.0):
+        if not domain.periodic:
+            _balance(flow, slabs.means()[1])
+        flow.run(CHUNK)
+        found.append(slabs.permeability())
+        if (not found[-1] > 0.0 and flow.steps >= LEAST_STEPS) or flow.steps >= MOST_STEPS:
+            nodes = f"{flow.steps} steps on {flow.lattice.fluid:,} nodes"
+            raise FiltercakeError(f"the flow has not settled after {nodes}: k = {found[-1]:.4g} m2")
+        left = _to_come(found)
+    spacing = flow.lattice.spacing
+    return Level(flow.lattice.shape[2], slabs.means()[1] / spacing, found[-1], left, flow.steps, flow.lattice.fluid)
+
+
+def _balance(flow: Flow, sauter: float) -> None:
+    """Push less where more flows than on average, as the pressure would after thousands of steps."""
+    if flow.steps < 2 * CHUNK:
+        return
+    reach = max(1, int(0.5 * sauter / flow.lattice.spacing))
+    window = np.hanning(2 * reach + 3)[1:-1]
+    window /= window.sum()
+    pressure, _, flux = flow.layers()
+    gradient = flow.force - 0.5 * (np.roll(pressure, -1) - np.roll(pressure, 1))
+    gradient = np.maximum(scipy.ndimage.convolve1d(gradient, window, mode="wrap"), 0.0)
+    flux = scipy.ndimage.convolve1d(flux, window, mode="wrap")
+    mean = float(np.sum(flux * gradient) / gradient.sum())
+    flow.push(flow.force - gradient * np.clip(flux / mean - 1.0, -0.5, 0.5))
+
+
+def _to_come(found: list[float]) -> float:
+    """Relative change still to come if a series goes on as it did, and no less than its last step."""
+    if len(found) < 4:
+        return math.inf
+    last, before = abs(found[-1] - found[-2]), abs(found[-2] - found[-3])
+    ratio = min(last / before, 0.9) if before > 0.0 else 0.0
+    return max(last * ratio / (1.0 - ratio), last) / abs(found[-1])
+
+
+def _force(domain: Domain, lattice: Lattice) -> FloatArray:
+    """Return a unit force for each layer, of a bed only where its spheres are."""
+    heights, spheres = _heights(domain, lattice), domain.spheres
+    top = float((spheres.position[:, 2] + spheres.radius).max())
+    bottom = float((spheres.position[:, 2] - spheres.radius).min())
+    return np.asarray(((heights > bottom) & (heights < top)) | domain.periodic, dtype=np.float64)
+
+
+def _heights(domain: Domain, lattice: Lattice) -> FloatArray:
+    """Heights of the layers of nodes, m."""
+    return np.asarray(domain.spheres.bottom + (np.arange(lattice.shape[0]) + 0.5) * lattice.spacing)
+
+
+def _mean_pores(
+    position: FloatArray, radius: FloatArray, area: float, heights: FloatArray, weights: FloatArray
+) -> tuple[float, float]:
+    """Porosity, overlaps counted twice, and Sauter mean diameter (m) over weighted heights."""
+    weights = weights / weights.sum()
+    solid = 0.0
+    over_diameter = 0.0
+    for z, r in zip(position[:, 2], radius, strict=True):
+        first, last = np.searchsorted(heights, (z - r, z + r))
+        volume = float(np.pi * np.sum(weights[first:last] * (r**2 - (heights[first:last] - z) ** 2)))
+        solid += volume
+        over_diameter += volume / (2.0 * r)
+    return max(1.0 - solid / area, 0.05), solid / over_diameter
+
+
+class _Slabs:
+    """What the layers of a flow say of slabs of the bed."""
+
+    def __init__(self, domain: Domain, flow: Flow):
+        self.domain, self.flow = domain, flow
+        self.heights = _heights(domain, flow.lattice)
+        self.inside = np.flatnonzero((self.heights > domain.slab.lower) & (self.heights < domain.slab.upper))
+
+    def permeability(self, layers: IntArray | None = None) -> float:
+        """Return the permeability of some layers, of the whole slab by default, m2."""
+        speed = self.flow.layers()[1]
+        chosen = self.inside if layers is None else layers
+        if self.domain.periodic and layers is None:
+            gradient, velocity = 1.0, float(speed.mean())
+        else:
+            x = chosen - chosen.mean()
+            gradient = float(np.sum(x * self.flow.potential()[chosen]) / np.sum(x * x))
+            velocity = float(np.sum(speed[chosen] * self._weights(chosen)))
+        return velocity * self.flow.viscosity / gradient * self.flow.lattice.spacing**2
+
+    def means(self, layers: IntArray | None = None) -> tuple[float, float]:
+        """Return porosity and Sauter mean diameter (m), each layer weighted as in the slope of the pressure."""
+        chosen = self.inside if layers is None else layers
+        weights = self._weights(chosen)
+        _, ny, nx = self.flow.lattice.shape
+        porosity = float(np.sum(self.flow.lattice.fluid_per_layer()[chosen] / (ny * nx) * weights))
+        spheres, area = self.domain.spheres, float(self.domain.spheres.box[0] * self.domain.spheres.box[1])
+        sauter = _mean_pores(spheres.position, spheres.radius, area, self.heights[chosen], weights)[1]
+        return porosity, sauter
+
+    def _weights(self, chosen: IntArray) -> FloatArray:
+        """Weights with which the slope of a line over these layers takes the gradient of each: a parabola."""
+        if self.domain.periodic and chosen.size == self.heights.size:
+            return np.full(chosen.size, 1.0 / chosen.size)
+        x = np.arange(chosen.size) + 0.5
+        weights = x * (chosen.size - x)
+        return np.asarray(weights / weights.sum())
+
+
+def _cut(domain: Domain, flow: Flow) -> Picture:
+    """Take the speed in the upright cut through the middle."""
+    nz, ny, nx = flow.lattice.shape
+    plane = flow.lattice.number[:, ny // 2, :]
+    speed = np.full((nz, nx), np.nan)
+    fluid = plane >= 0
+    speed[fluid] = np.linalg.norm(flow.velocity()[plane[fluid]], axis=1)
+    return Picture(speed / float(flow.layers()[1].mean()), flow.lattice.spacing, domain.spheres.bottom)
+
+
+def _check_memory(domain: Domain, across: int) -> float:
+    """Return the bytes that a lattice takes; an error where the machine has fewer."""
+    box, spacing = domain.spheres.box, float(domain.spheres.box[0]) / across
+    volume = float(np.sum(4.0 / 3.0 * np.pi * domain.spheres.radius**3))
+    needed = bytes_needed(box, spacing, max(1.0 - volume / float(np.prod(box)), 0.05))
+    free = available_bytes()
+    if needed > free:
+        raise FiltercakeError(
+            f"the flow on {across} nodes across the box takes {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB "
+            "are free: use a larger accuracy, or fewer particles"
+        )
+    return needed
+
+
+def available_bytes() -> float:
+    """Memory that the machine has to spare."""
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * float(line.split()[1])
+    except OSError:
+        pass
+    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+
+
+def _line(level: Level, seconds: float) -> str:
+    return (
+        f"{level.diameters_per_spacing:.1f} nodes per mean diameter: {level.nodes:,} nodes, {level.steps} steps, k = "
+        f"{level.permeability:.4g} m2, {duration(seconds)}"
+    )
