@@ -1,0 +1,303 @@
+"""What solved packings say of the laws: the Kozeny constant by distribution, exponents, and how much a constant covers.
+
+The constant of Carman's law is ``A = eps^3 D^2 / (k (1 - eps)^2)``, D the Sauter mean diameter. Eq. 3 of the paper has
+1/sum(x/d^2) for D^2: its constant is A over the ratio of sum(x/d^2) to (sum(x/d))^2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import pandas as pd
+import scipy
+
+from filtercake.crystals.csd import mixture
+from filtercake.filtration.resistance import KOZENY_CARMAN, carman_sauter, kozeny_carman
+from filtercake.statistics import Spread, quantile
+from filtercake.units import MICROMETRE, FloatArray
+from filtercake.validation.permeability import BED, FINER, FINER_ENDING, LAYERED, MIXED
+
+CARMAN: Final = KOZENY_CARMAN
+"""Constant that the paper has in its eq. 3: P. C. Carman, Trans. Inst. Chem. Eng. 15 (1937) 150."""
+ERDIM: Final = 160.0
+"""E. Erdim, O. Akgiray, I. Demir, Powder Technol. 283 (2015) 488."""
+ERGUN: Final = 150.0
+"""S. Ergun, Chem. Eng. Prog. 48 (1952) 89."""
+REFERENCE_POROSITY: Final = 0.35
+"""Porosity at which fits with different exponents are compared."""
+MSMPR_RATIO: Final = math.gamma(4.0) * math.gamma(2.0) / math.gamma(3.0) ** 2
+"""Sum of x/d^2 over (sum of x/d)^2 of an MSMPR crystallizer's product, all of it: x goes as d^3 exp(-d/(G tau))."""
+PAPERS_POROSITY: Final = 0.358
+"""Of the paper's simulated 25/75 PMMA cake (its Table 4)."""
+MEASURED: Final = {"porosity": 0.38, "resistance": 1.48e9, "density": 1180.0}
+"""The same cake measured (Bourcier et al., 2016): m/kg, kg/m3."""
+FIT_COLUMNS: Final = ("packings", "fit", "quantity", "value", "ci95", "cases")
+
+
+def van_der_hoef(porosity: FloatArray) -> FloatArray:
+    """Return the Kozeny constant of random arrays of equal hard spheres (n,) at porosities (n,).
+
+    Lattice Boltzmann fit, within 3 %: M. A. van der Hoef, R. Beetstra, J. A. M. Kuipers, J. Fluid Mech. 528 (2005) 233.
+
+    Examples
+    --------
+    >>> van_der_hoef(np.array([0.55, 0.7])).round(1).tolist()
+    [187.3, 206.2]
+    """
+    solids = 1.0 - porosity
+    return np.asarray(CARMAN + 18.0 * porosity**4 * (1.0 + 1.5 * np.sqrt(solids)) / solids)
+
+
+def spread(table: pd.DataFrame) -> Spread:
+    """Relative standard deviation of A of packings of one kind, times the root of their effective spheres.
+
+    Pooled over the mixed cases; it includes what the nodes' places add.
+    """
+    squares, freedom = 0.0, 0.0
+    for _, rows in table[table["kind"].isin(MIXED)].groupby("case"):
+        constant, weight = np.log(rows["kozeny_constant"]), rows["effective_spheres"]
+        squares += float(np.sum(weight * (constant - np.average(constant, weights=weight)) ** 2))
+        freedom += len(rows) - 1.0
+    return Spread(math.sqrt(squares / freedom), freedom) if freedom else Spread(math.nan, 0.0)
+
+
+def by_case(table: pd.DataFrame) -> pd.DataFrame:
+    """Average the packings of each case, in the table's order.
+
+    Returns
+    -------
+    DataFrame
+        case, kind, label, n, spheres (of one packing), porosity, ratio, constant, packings_ci95 (between packings,
+        relative), numerical_ci95 (relative), ci95 (both, absolute), eq3 and eq3_ci95 (the same by eq. 3's mean) and
+        too_high (relative excess of eq. 3 with Carman's constant).
+    """
+    pooled = spread(table)
+    rows = []
+    for (case, kind, label), packings in table.groupby(["case", "kind", "label"], sort=False):
+        between = quantile(pooled.freedom) * pooled.sd / math.sqrt(float(packings["effective_spheres"].sum()))
+        between = between if kind in MIXED or len(packings) > 1 else 0.0
+        numerical = float(np.hypot(packings["resolution"], packings["convergence"]).mean())
+        constant, eq3 = float(packings["kozeny_constant"].mean()), float(packings["kozeny_constant_eq3"].mean())
+        whole = math.hypot(between, numerical)
+        rows.append(
+            {
+                "case": case,
+                "kind": kind,
+                "label": label,
+                "n": len(packings),
+                "spheres": int(packings["spheres"].iloc[0]),
+                "porosity": float(packings["porosity"].mean()),
+                "ratio": float(packings["ratio"].mean()),
+                "constant": constant,
+                "packings_ci95": between,
+                "numerical_ci95": numerical,
+                "ci95": whole * constant,
+                "eq3": eq3,
+                "eq3_ci95": whole * eq3,
+                "too_high": CARMAN / eq3 - 1.0,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fit of ``ln(k (1 - eps)^2 / D^2) = a ln eps - ln A + b ln ratio``; half-widths are 95 %.
+
+    Attributes
+    ----------
+    exponent, exponent_ci95 : float
+        a; half-width 0 where it was given.
+    constant, constant_ci95 : float
+        A times ``REFERENCE_POROSITY^(3 - a)``: what stands for A in Carman's law at that porosity.
+    width, width_ci95 : float
+        b: 0 by Carman's law, -1 by eq. 3.
+    scatter : float
+        Standard deviation of cases about the fit that their own errors do not explain.
+    cases : int
+        Cases.
+    """
+
+    exponent: float
+    exponent_ci95: float
+    constant: float
+    constant_ci95: float
+    width: float
+    width_ci95: float
+    scatter: float
+    cases: int
+
+    @property
+    def bare_constant(self) -> float:
+        """A itself: what the law would be at a porosity of 1."""
+        return self.constant * math.exp((self.exponent - 3.0) * math.log(REFERENCE_POROSITY))
+
+
+def fit(cases: pd.DataFrame, *, exponent: float | None = None) -> Fit:
+    """Fit exponents and constant to averages of cases (:func:`by_case`), each case one observation.
+
+    Its variance is that of its own error and a scatter between cases, chosen to fit the residuals.
+
+    Parameters
+    ----------
+    cases : DataFrame
+        porosity, ratio, constant and ci95.
+    exponent : float or None
+        a, where it is given; otherwise it is fitted.
+    """
+    porosity, ratio = np.log(cases["porosity"] / REFERENCE_POROSITY), np.log(cases["ratio"])
+    # ln(k phi^2 / D^2) = 3 ln eps - ln A of each case
+    known = 3.0 if exponent is None else exponent
+    answer = (3.0 - known) * porosity - np.log(cases["constant"])
+    columns = [np.ones(len(cases)), ratio] + ([porosity] if exponent is None else [])
+    design = np.column_stack(columns)
+    own = (cases["ci95"] / cases["constant"] / quantile()).to_numpy(np.float64)
+    scatter = _scatter(design, answer.to_numpy(np.float64), own)
+    found, error = _solve(design, answer.to_numpy(np.float64), own**2 + scatter**2)
+    student = quantile(float(len(cases) - design.shape[1]))
+    half = [student * value for value in error]
+    constant = math.exp(-found[0])
+    slope, slope_half = (known + found[2], half[2]) if exponent is None else (known, 0.0)
+    return Fit(slope, slope_half, constant, constant * half[0], found[1], half[1], scatter, len(cases))
+
+
+def _solve(design: FloatArray, answer: FloatArray, variance: FloatArray) -> tuple[list[float], list[float]]:
+    """Weighted least squares: parameters and their standard errors."""
+    covariance = np.linalg.inv(design.T @ (design / variance[:, None]))
+    return (covariance @ design.T @ (answer / variance)).tolist(), np.sqrt(np.diag(covariance)).tolist()
+
+
+def _scatter(design: FloatArray, answer: FloatArray, own: FloatArray) -> float:
+    """Find the standard deviation between cases with which chi-square is as expected; 0 where it is less anyway."""
+    freedom = design.shape[0] - design.shape[1]
+
+    def excess(scatter: float) -> float:
+        variance = own**2 + scatter**2
+        residual = answer - design @ np.array(_solve(design, answer, variance)[0])
+        return float(np.sum(residual**2 / variance) - freedom)
+
+    return 0.0 if excess(0.0) <= 0.0 else float(scipy.optimize.brentq(excess, 0.0, 10.0))
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One constant for all distributions.
+
+    Attributes
+    ----------
+    value, sd : float
+        Mean over the cases, and the standard deviation between them.
+    ci95 : float
+        Half-width that holds a distribution taken at random: that of a prediction, not of the mean.
+    mean_ci95 : float
+        Half-width of the mean.
+    cases : int
+        Cases.
+    """
+
+    value: float
+    sd: float
+    ci95: float
+    mean_ci95: float
+    cases: int
+
+
+def overall(values: pd.Series[float]) -> Constant:
+    """Sum up the constants of the cases."""
+    count, sd = len(values), float(values.std())
+    student = quantile(count - 1.0) * sd
+    return Constant(float(values.mean()), sd, student * math.sqrt(1.0 + 1.0 / count), student / math.sqrt(count), count)
+
+
+def mixed_beds(cases: pd.DataFrame) -> pd.DataFrame:
+    """Select the settled beds."""
+    return cases[cases["kind"] == BED]
+
+
+def mixed(cases: pd.DataFrame) -> pd.DataFrame:
+    """Select beds and hard spheres."""
+    return cases[cases["kind"].isin(MIXED)]
+
+
+def layers_over_mixed(cases: pd.DataFrame) -> pd.DataFrame:
+    """Hold layers against the same spheres mixed.
+
+    Returns
+    -------
+    DataFrame
+        The layered rows of :func:`by_case` with ``over_mixed`` (A over that of the mixture: 1 by Carman's law,
+        ``ratio`` by eq. 3), over_mixed_ci95, and ``way`` and way_ci95: 0 where Carman's law holds, 1 where eq. 3 does.
+    """
+    reference = cases[cases["case"] == "hard_mixed"].iloc[0]
+    layers = cases[cases["kind"] == LAYERED]
+    over = layers["constant"] / reference["constant"]
+    half = over * np.hypot(layers["packings_ci95"], reference["packings_ci95"])
+    span = layers["ratio"] - 1.0
+    return layers.assign(over_mixed=over, over_mixed_ci95=half, way=(over - 1.0) / span, way_ci95=half / span)
+
+
+def finer(table: pd.DataFrame) -> pd.DataFrame:
+    """Hold beds solved with a smaller numerical error against the same beds as they are in the averages.
+
+    Returns
+    -------
+    DataFrame
+        label, constant and numerical_ci95 (relative) as in the averages, finer and finer_ci95 with the smaller error,
+        and change, the relative difference.
+    """
+    listed = table.assign(numerical=np.hypot(table["resolution"], table["convergence"]))
+    again = listed[listed["kind"] == FINER].set_index("case")
+    again.index = again.index.str.removesuffix(FINER_ENDING)
+    before = listed[(listed["kind"] == BED) & (listed["replicate"] == 0)].set_index("case").loc[again.index]
+    return pd.DataFrame(
+        {
+            "label": again["label"],
+            "constant": before["kozeny_constant"],
+            "numerical_ci95": before["numerical"],
+            "finer": again["kozeny_constant"],
+            "finer_ci95": again["numerical"],
+            "change": again["kozeny_constant"] / before["kozeny_constant"] - 1.0,
+        }
+    ).reset_index(drop=True)
+
+
+def papers_mixture(constant: float) -> dict[str, float]:
+    """Resistance (m/kg) of the paper's 25/75 mixture by both laws, at its own porosity and at the measured one."""
+    csd = mixture([20.0 * MICROMETRE, 50.0 * MICROMETRE], [0.25, 0.75])
+    density = MEASURED["density"]
+    found = {"measured": MEASURED["resistance"], "measured_porosity": MEASURED["porosity"]}
+    for name, porosity in (("simulated", PAPERS_POROSITY), ("at_measured", MEASURED["porosity"])):
+        found[f"eq3_{name}"] = kozeny_carman(porosity, csd, density)
+        found[f"sauter_{name}"] = constant / CARMAN * carman_sauter(porosity, csd, density)
+    return {**found, "simulated_porosity": PAPERS_POROSITY}
+
+
+SETS: Final[dict[str, Callable[[pd.DataFrame], pd.DataFrame]]] = {
+    "beds": mixed_beds,
+    "beds and hard spheres": mixed,
+}
+
+
+def fit_table(cases: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate all fits and constants: ``FIT_COLUMNS``."""
+    rows = []
+    for name, choose in SETS.items():
+        chosen = choose(cases)
+        for label, exponent in (("free", None), ("eps^3", 3.0)):
+            found = fit(chosen, exponent=exponent)
+            values = [
+                ("exponent of porosity", found.exponent, found.exponent_ci95),
+                (f"A at porosity {REFERENCE_POROSITY:g}", found.constant, found.constant_ci95),
+                ("exponent of ratio", found.width, found.width_ci95),
+                ("scatter between cases", found.scatter, math.nan),
+            ]
+            rows += [(name, label, *value, found.cases) for value in values]
+        for label, column in (("one constant, Sauter mean", "constant"), ("one constant, eq. 3", "eq3")):
+            one = overall(chosen[column])
+            rows.append((name, label, "A", one.value, one.ci95, one.cases))
+            rows.append((name, label, "sd", one.sd, math.nan, one.cases))
+    return pd.DataFrame(rows, columns=list(FIT_COLUMNS))
