@@ -17,7 +17,6 @@ from filtercake.packing.compiled import cached_njit
 from filtercake.units import FloatArray
 
 SWEEPS: Final = 2000
-"""Moves of each sphere once none overlap."""
 MOST_SWEEPS: Final = 100_000
 """Moves of each sphere in which overlaps must vanish."""
 TAKEN: Final = 0.4
@@ -34,7 +33,9 @@ class Species:
     high: float = math.inf
 
 
-def arrange(species: Sequence[Species], box: FloatArray, seed: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+def arrange(
+    species: Sequence[Species], box: FloatArray, seed: Sequence[int], sweeps: int = SWEEPS
+) -> tuple[FloatArray, FloatArray]:
     """Arrange hard spheres at random; return their centres (n, 3) and radii (n,), m.
 
     Parameters
@@ -45,6 +46,8 @@ def arrange(species: Sequence[Species], box: FloatArray, seed: Sequence[int]) ->
         Sides of the cell, m.
     seed : sequence of int
         Seed.
+    sweeps : int
+        Moves of each sphere once none overlap.
 
     Raises
     ------
@@ -56,7 +59,7 @@ def arrange(species: Sequence[Species], box: FloatArray, seed: Sequence[int]) ->
     bounds = np.array([(kind.low, min(kind.high, box[2])) for kind in species for _ in range(kind.count)])
     position = random.random((radius.size, 3)) * box
     position[:, 2] = bounds[:, 0] + random.random(radius.size) * (bounds[:, 1] - bounds[:, 0])
-    step, left = 0.2 * float(radius.min()), SWEEPS
+    step, left = 0.2 * float(radius.min()), sweeps
     for _ in range(MOST_SWEEPS):
         overlapping, taken = _sweep(position, radius, box, bounds, step, random.random((radius.size, 3)))
         step = min(step * (1.02 if taken > TAKEN * radius.size else 0.98), 0.5 * float(box.min()))
@@ -103,8 +106,12 @@ def _overlap(position: FloatArray, radius: FloatArray, box: FloatArray, i: int, 
     total = 0.0
     for j in range(radius.size):
         reach = radius[i] + radius[j]
-        dx, dy, dz = abs(position[j, 0] - x), abs(position[j, 1] - y), abs(position[j, 2] - z)
-        dx, dy, dz = min(dx, box[0] - dx), min(dy, box[1] - dy), min(dz, box[2] - dz)
+        dz = abs(position[j, 2] - z)
+        dz = min(dz, box[2] - dz)
+        if dz >= reach:
+            continue
+        dx, dy = abs(position[j, 0] - x), abs(position[j, 1] - y)
+        dx, dy = min(dx, box[0] - dx), min(dy, box[1] - dy)
         square = dx * dx + dy * dy + dz * dz
         if square < reach * reach and j != i:
             total += reach - math.sqrt(square)

@@ -166,8 +166,8 @@ def permeability(template: Path, table: pd.DataFrame, second: pd.DataFrame) -> s
             name: {
                 "free": resistance_law.fit(choose(averages)),
                 "cubic": resistance_law.fit(choose(averages), exponent=3.0),
-                "carman": resistance_law.overall(choose(averages)["constant"]),
-                "eq3": resistance_law.overall(choose(averages)["eq3"]),
+                "carman": resistance_law.overall(choose(averages), "constant"),
+                "eq3": resistance_law.overall(choose(averages), "eq3"),
             }
             for name, choose in resistance_law.SETS.items()
         },

@@ -37,6 +37,7 @@ FINER_ACCURACY: Final = 0.007
 CELL_SPHERES: Final = 250
 SEED: Final = 20_26
 SLICES: Final = 400
+SUBSLICES: Final = 20
 COLUMNS: Final = (
     "case",
     "kind",
@@ -48,6 +49,7 @@ COLUMNS: Final = (
     "porosity",
     "sauter_um",
     "ratio",
+    "series",
     "permeability_m2",
     "kozeny_constant",
     "kozeny_constant_eq3",
@@ -97,7 +99,7 @@ def cases() -> list[Case]:
     """List all cases: what is cheap first, so that a table soon has something of everything."""
     beds = [*_one_size(), *_pmma()]
     wide = _wide()
-    return [*beds, *_hard_spheres(), *_layers(), *_lattices(), *wide, *_finer([*beds, *wide])]
+    return [*beds, *_hard_spheres(), *_lattices(), *wide, *_layers(), *_finer([*beds, *wide])]
 
 
 def _finer(beds: Iterable[Case]) -> list[Case]:
@@ -183,34 +185,52 @@ def _hard_spheres() -> list[Case]:
 
 LAYER_RATIO: Final = 3.0
 LAYER_SOLIDS: Final = 0.5
-LAYER_SIDE: Final = 12
-"""Side of the layered cells in finer diameters; they are twice as high, half of it fine and half coarse."""
+LAYER_SIDE: Final = 9
+LAYER_HEIGHT: Final = 36
+"""Side and height of the layered cells in finer diameters; half of the height is fine and half coarse."""
+LAYER_SWEEPS: Final = 400
 
 
 def _layers() -> list[Case]:
     def cell(pairs: int) -> Callable[[Sequence[int]], Geometry]:
         return lambda seed: layered(pairs, seed)
 
-    thick = []
-    for pairs, number in ((1, "two"), (2, "four"), (4, "eight")):
-        label = f"{number} layers of {LAYER_SIDE / pairs / LAYER_RATIO:g} coarse diameters"
-        thick.append(Case(f"layers_{2 * pairs}", LAYERED, label, 3, 0.01, cell=cell(pairs)))
-    return [*thick, Case("hard_mixed", CELL, "the same spheres mixed, hard spheres 1:3", 3, 0.01, cell=cell(0))]
+    found = []
+    for pairs, number in ((1, "two"), (3, "six"), (6, "twelve")):
+        thickness = LAYER_HEIGHT / 2.0 / pairs / LAYER_RATIO
+        label = f"{number} layers, each {thickness:g} coarse diameter{'' if thickness == 1.0 else 's'}"
+        found.append(Case(f"layers_{2 * pairs}", LAYERED, label, cell=cell(pairs)))
+    return [*found, Case("hard_mixed", CELL, "hard spheres 1:3 50/50, solids 0.50", cell=cell(0))]
 
 
-def layered(pairs: int, seed: Sequence[int]) -> Geometry:
+def layered(pairs: int, seed: Sequence[int], sweeps: int = LAYER_SWEEPS) -> Geometry:
     """Make a cell of fine and coarse hard spheres, as much of each, in ``pairs`` of layers; 0 mixes them."""
-    side = LAYER_SIDE * DIAMETER
-    box = side * np.array([1.0, 1.0, 2.0])
-    volume = LAYER_SOLIDS * float(np.prod(box)) / 2.0 / max(pairs, 1)
-    thickness = float(box[2]) / 2.0 / max(pairs, 1)
+    box = DIAMETER * np.array([LAYER_SIDE, LAYER_SIDE, LAYER_HEIGHT])
+    layers = 2 * max(pairs, 1)
+    thickness = float(box[2]) / layers
     species = []
-    for layer in range(2 * max(pairs, 1)):
+    for layer in range(layers):
         diameter = DIAMETER * (LAYER_RATIO if layer % 2 else 1.0)
-        count = round(volume / (math.pi / 6.0 * diameter**3))
+        count = round(LAYER_SOLIDS * float(np.prod(box)) / layers / (math.pi / 6.0 * diameter**3))
         bounds = (layer * thickness, (layer + 1) * thickness) if pairs else (0.0, math.inf)
         species.append(Species(count, diameter, *bounds))
-    return (*arrange(species, box, seed), box)
+    return (*arrange(species, box, seed, sweeps), box)
+
+
+def series(position: FloatArray, radius: FloatArray, box: FloatArray) -> float:
+    """Resistance of slices in series over that of the whole cell, Carman's law for each of them.
+
+    Slices are one of the finest diameters thick.
+    """
+    count = round(float(box[2]) / (2.0 * float(radius.min()))) * SUBSLICES
+    heights = (np.arange(count) + 0.5) / count * box[2]
+    away = heights[None, :] - position[:, 2, None]
+    away -= box[2] * np.round(away / box[2])
+    area = np.pi * np.maximum(radius[:, None] ** 2 - away**2, 0.0) / float(box[0] * box[1])
+    solids, surface = (np.asarray(part) for part in (area.sum(axis=0), (area / (2.0 * radius[:, None])).sum(axis=0)))
+    solids, surface = (part.reshape(-1, SUBSLICES).mean(axis=1) for part in (solids, surface))
+    whole = float(surface.mean()) ** 2 / (1.0 - float(solids.mean())) ** 3
+    return float(np.mean(surface**2 / (1.0 - solids) ** 3)) / whole
 
 
 LATTICES: Final = {
@@ -270,21 +290,20 @@ def solve(folder: Path, case: Case, say: Say = lambda _: None) -> list[dict[str,
 
 def _row(case: Case, replicate: int, folder: Path) -> dict[str, Any]:
     started = time.perf_counter()
-    position, radius, seed, height, found = (_solved_bed if case.cell is None else _solved_cell)(
-        case, replicate, folder
-    )
-    ratio = width_ratio(position, radius, height, parabolic=case.cell is None)
+    solved = _solved_bed(case, replicate, folder) if case.cell is None else _solved_cell(case, replicate)
+    found, ratio = solved.found, solved.ratio
     return {
         "case": case.name,
         "kind": case.kind,
         "label": case.label,
         "replicate": replicate,
-        "seed": seed,
-        "spheres": int(radius.size),
+        "seed": solved.seed,
+        "spheres": solved.spheres,
         "effective_spheres": (quantile() * SPREAD / found.slab) ** 2,
         "porosity": found.porosity,
         "sauter_um": found.sauter_diameter / MICROMETRE,
         "ratio": ratio,
+        "series": solved.series,
         "permeability_m2": found.permeability,
         "kozeny_constant": found.kozeny_constant,
         "kozeny_constant_eq3": found.kozeny_constant / ratio,
@@ -296,8 +315,15 @@ def _row(case: Case, replicate: int, folder: Path) -> dict[str, Any]:
     }
 
 
-Solved = tuple[FloatArray, FloatArray, int, tuple[float, float], Permeability]
-"""Centres and radii (m), seed, heights of what was measured (m), and what was found."""
+@dataclass(frozen=True)
+class Solved:
+    """What was found of one packing; :func:`series` of cells only."""
+
+    found: Permeability
+    seed: int
+    spheres: int
+    ratio: float
+    series: float | None = None
 
 
 def _solved_bed(case: Case, replicate: int, folder: Path) -> Solved:
@@ -311,10 +337,11 @@ def _solved_bed(case: Case, replicate: int, folder: Path) -> Solved:
     packing = Packing.load(bed.files[0])
     found = measure_bed(packing.position, packing.radius, packing.length, accuracy=case.accuracy)
     slab = interior_slab(packing.position, packing.radius)
-    return packing.position, packing.radius, 1 + replicate, (slab.lower, slab.upper), found
+    ratio = width_ratio(packing.position, packing.radius, (slab.lower, slab.upper))
+    return Solved(found, 1 + replicate, packing.radius.size, ratio)
 
 
-def _solved_cell(case: Case, replicate: int, _folder: Path) -> Solved:
+def _solved_cell(case: Case, replicate: int) -> Solved:
     assert case.cell is not None
     position, radius, box = case.cell((SEED, replicate))
     found = measure_cell(position, radius, box, accuracy=case.accuracy)
@@ -322,23 +349,20 @@ def _solved_cell(case: Case, replicate: int, _folder: Path) -> Solved:
     porosity = 1.0 - float(np.sum(4.0 / 3.0 * math.pi * radius**3) / np.prod(box))
     constant = porosity**3 * found.sauter_diameter**2 / (found.permeability * (1.0 - porosity) ** 2)
     found = replace(found, porosity=porosity, kozeny_constant=constant)
-    return position, radius, replicate, (0.0, float(box[2])), found
+    return Solved(found, replicate, radius.size, width_ratio(position, radius), series(position, radius, box))
 
 
-def width_ratio(
-    position: FloatArray, radius: FloatArray, height: tuple[float, float], *, parabolic: bool = False
-) -> float:
-    """Sum of x/d^2 over the square of the sum of x/d, between two heights (m): 1 for spheres of one size.
+def width_ratio(position: FloatArray, radius: FloatArray, between: tuple[float, float] | None = None) -> float:
+    """Sum of x/d^2 over the square of the sum of x/d: 1 for spheres of one size.
 
-    ``parabolic`` weighs the heights as the permeability of a bed does; otherwise spheres count whole.
+    Of a bed, ``between`` two heights (m), which are weighted as in its permeability; otherwise of all spheres.
     """
-    if not parabolic:
+    if between is None:
         volume = radius**3
     else:
-        lower, upper = height
+        lower, upper = between
         heights = lower + (np.arange(SLICES) + 0.5) / SLICES * (upper - lower)
-        weights = (heights - lower) * (upper - heights)
         square = radius[:, None] ** 2 - (heights[None, :] - position[:, 2, None]) ** 2
-        volume = np.maximum(square, 0.0) @ weights
+        volume = np.maximum(square, 0.0) @ ((heights - lower) * (upper - heights))
     share = volume / volume.sum()
     return float(np.sum(share / radius**2) / np.sum(share / radius) ** 2)

@@ -19,7 +19,7 @@ from filtercake.crystals.csd import mixture
 from filtercake.filtration.resistance import KOZENY_CARMAN, carman_sauter, kozeny_carman
 from filtercake.statistics import Spread, quantile
 from filtercake.units import MICROMETRE, FloatArray
-from filtercake.validation.permeability import BED, FINER, FINER_ENDING, LAYERED, MIXED
+from filtercake.validation.permeability import BED, FINER, FINER_ENDING, LATTICE, LAYERED, MIXED
 
 CARMAN: Final = KOZENY_CARMAN
 """Constant that the paper has in its eq. 3: P. C. Carman, Trans. Inst. Chem. Eng. 15 (1937) 150."""
@@ -29,6 +29,8 @@ ERGUN: Final = 150.0
 """S. Ergun, Chem. Eng. Prog. 48 (1952) 89."""
 REFERENCE_POROSITY: Final = 0.35
 """Porosity at which fits with different exponents are compared."""
+MIXTURE: Final = "hard_mixed"
+"""Case with the spheres of the layers."""
 MSMPR_RATIO: Final = math.gamma(4.0) * math.gamma(2.0) / math.gamma(3.0) ** 2
 """Sum of x/d^2 over (sum of x/d)^2 of an MSMPR crystallizer's product, all of it: x goes as d^3 exp(-d/(G tau))."""
 PAPERS_POROSITY: Final = 0.358
@@ -71,15 +73,15 @@ def by_case(table: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        case, kind, label, n, spheres (of one packing), porosity, ratio, constant, packings_ci95 (between packings,
-        relative), numerical_ci95 (relative), ci95 (both, absolute), eq3 and eq3_ci95 (the same by eq. 3's mean) and
-        too_high (relative excess of eq. 3 with Carman's constant).
+        case, kind, label, n, spheres (of one packing), porosity, ratio, series, constant, packings_ci95 (between
+        packings, relative), numerical_ci95 (relative), ci95 (both, absolute), eq3 and eq3_ci95 (the same by eq. 3's
+        mean) and too_high (relative excess of eq. 3 with Carman's constant).
     """
     pooled = spread(table)
     rows = []
     for (case, kind, label), packings in table.groupby(["case", "kind", "label"], sort=False):
         between = quantile(pooled.freedom) * pooled.sd / math.sqrt(float(packings["effective_spheres"].sum()))
-        between = between if kind in MIXED or len(packings) > 1 else 0.0
+        between = 0.0 if kind == LATTICE else between
         numerical = float(np.hypot(packings["resolution"], packings["convergence"]).mean())
         constant, eq3 = float(packings["kozeny_constant"].mean()), float(packings["kozeny_constant_eq3"].mean())
         whole = math.hypot(between, numerical)
@@ -92,6 +94,7 @@ def by_case(table: pd.DataFrame) -> pd.DataFrame:
                 "spheres": int(packings["spheres"].iloc[0]),
                 "porosity": float(packings["porosity"].mean()),
                 "ratio": float(packings["ratio"].mean()),
+                "series": float(packings["series"].mean()),
                 "constant": constant,
                 "packings_ci95": between,
                 "numerical_ci95": numerical,
@@ -191,26 +194,44 @@ class Constant:
     ----------
     value, sd : float
         Mean over the cases, and the standard deviation between them.
-    ci95 : float
-        Half-width that holds a distribution taken at random: that of a prediction, not of the mean.
     mean_ci95 : float
         Half-width of the mean.
+    random_ci95 : float
+        Half-width that holds a distribution taken at random: that of a prediction, not of the mean.
+    numerical_ci95 : float
+        What the numerical error adds where all cases share it.
+    ci95 : float
+        Both of them: the half-width to use.
     cases : int
         Cases.
     """
 
     value: float
     sd: float
-    ci95: float
     mean_ci95: float
+    random_ci95: float
+    numerical_ci95: float
     cases: int
 
+    @property
+    def ci95(self) -> float:
+        """Half-width to use."""
+        return math.hypot(self.random_ci95, self.numerical_ci95)
 
-def overall(values: pd.Series[float]) -> Constant:
-    """Sum up the constants of the cases."""
-    count, sd = len(values), float(values.std())
+
+def overall(cases: pd.DataFrame, column: str) -> Constant:
+    """Sum up a constant, ``constant`` or ``eq3``, of the cases (:func:`by_case`), each counting the same."""
+    values, count = cases[column], len(cases)
+    sd = float(values.std())
     student = quantile(count - 1.0) * sd
-    return Constant(float(values.mean()), sd, student * math.sqrt(1.0 + 1.0 / count), student / math.sqrt(count), count)
+    return Constant(
+        value=float(values.mean()),
+        sd=sd,
+        mean_ci95=student / math.sqrt(count),
+        random_ci95=student * math.sqrt(1.0 + 1.0 / count),
+        numerical_ci95=float((values * cases["numerical_ci95"]).mean()),
+        cases=count,
+    )
 
 
 def mixed_beds(cases: pd.DataFrame) -> pd.DataFrame:
@@ -229,15 +250,14 @@ def layers_over_mixed(cases: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        The layered rows of :func:`by_case` with ``over_mixed`` (A over that of the mixture: 1 by Carman's law,
-        ``ratio`` by eq. 3), over_mixed_ci95, and ``way`` and way_ci95: 0 where Carman's law holds, 1 where eq. 3 does.
+        The layered rows of :func:`by_case` with ``over_mixed``, A over that of the mixture, and over_mixed_ci95. By
+        Carman's law for the whole cell it is 1, by eq. 3 ``ratio``, by Carman's law for slices in series ``slices``.
     """
-    reference = cases[cases["case"] == "hard_mixed"].iloc[0]
+    reference = cases[cases["case"] == MIXTURE].iloc[0]
     layers = cases[cases["kind"] == LAYERED]
     over = layers["constant"] / reference["constant"]
     half = over * np.hypot(layers["packings_ci95"], reference["packings_ci95"])
-    span = layers["ratio"] - 1.0
-    return layers.assign(over_mixed=over, over_mixed_ci95=half, way=(over - 1.0) / span, way_ci95=half / span)
+    return layers.assign(over_mixed=over, over_mixed_ci95=half, slices=layers["series"] / reference["series"])
 
 
 def finer(table: pd.DataFrame) -> pd.DataFrame:
@@ -297,7 +317,7 @@ def fit_table(cases: pd.DataFrame) -> pd.DataFrame:
             ]
             rows += [(name, label, *value, found.cases) for value in values]
         for label, column in (("one constant, Sauter mean", "constant"), ("one constant, eq. 3", "eq3")):
-            one = overall(chosen[column])
+            one = overall(chosen, column)
             rows.append((name, label, "A", one.value, one.ci95, one.cases))
             rows.append((name, label, "sd", one.sd, math.nan, one.cases))
     return pd.DataFrame(rows, columns=list(FIT_COLUMNS))

@@ -78,7 +78,7 @@ def test_the_one_constant_covers_a_distribution_taken_at_random() -> None:
     covered = 0
     for _ in range(2000):
         values = random.normal(170.0, 5.0, 11)
-        found = overall(pd.Series(values[:10]))
+        found = overall(pd.DataFrame({"constant": values[:10], "numerical_ci95": 0.0}), "constant")
         covered += abs(values[10] - found.value) <= found.ci95
     assert covered / 2000 == pytest.approx(0.95, abs=0.02)
 
@@ -89,14 +89,15 @@ def test_layers_are_held_against_the_mixture() -> None:
             "case": ["hard_mixed", "layers_2"],
             "kind": [CELL, LAYERED],
             "ratio": [1.25, 1.25],
+            "series": [1.1, 1.32],
             "constant": [180.0, 216.0],
             "packings_ci95": [0.02, 0.02],
         }
     )
     row = layers_over_mixed(cases).iloc[0]
     assert row["over_mixed"] == pytest.approx(1.2)
-    assert row["way"] == pytest.approx(0.8)
-    assert row["way_ci95"] == pytest.approx(1.2 * np.hypot(0.02, 0.02) / 0.25)
+    assert row["over_mixed_ci95"] == pytest.approx(1.2 * np.hypot(0.02, 0.02))
+    assert row["slices"] == pytest.approx(1.2)
 
 
 def test_lattices_and_layers_take_no_part_in_the_fits() -> None:
