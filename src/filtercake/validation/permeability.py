@@ -107,7 +107,7 @@ def _finer(beds: Iterable[Case]) -> list[Case]:
     return [
         replace(case, name=f"{case.name}{FINER_ENDING}", kind=FINER, replicates=1, accuracy=FINER_ACCURACY)
         for case in beds
-        if case.name in ("one_size", "pmma_50_50", "pmma_friction_0.3", "lognormal_0.4")
+        if case.name in ("one_size", "pmma_50_50", "pmma_friction_0.3")
     ]
 
 
@@ -199,8 +199,8 @@ def _layers() -> list[Case]:
     for pairs, number in ((1, "two"), (3, "six"), (6, "twelve")):
         thickness = LAYER_HEIGHT / 2.0 / pairs / LAYER_RATIO
         label = f"{number} layers, each {thickness:g} coarse diameter{'' if thickness == 1.0 else 's'}"
-        found.append(Case(f"layers_{2 * pairs}", LAYERED, label, cell=cell(pairs)))
-    return [*found, Case("hard_mixed", CELL, "hard spheres 1:3 50/50, solids 0.50", cell=cell(0))]
+        found.append(Case(f"layers_{2 * pairs}", LAYERED, label, 2, cell=cell(pairs)))
+    return [*found, Case("hard_mixed", CELL, "hard spheres 1:3 50/50, solids 0.50", 2, cell=cell(0))]
 
 
 def layered(pairs: int, seed: Sequence[int], sweeps: int = LAYER_SWEEPS) -> Geometry:

@@ -19,7 +19,7 @@ from filtercake.crystals.csd import mixture
 from filtercake.filtration.resistance import KOZENY_CARMAN, carman_sauter, kozeny_carman
 from filtercake.statistics import Spread, quantile
 from filtercake.units import MICROMETRE, FloatArray
-from filtercake.validation.permeability import BED, FINER, FINER_ENDING, LATTICE, LAYERED, MIXED
+from filtercake.validation.permeability import BED, CELL, FINER, FINER_ENDING, LATTICE, LAYERED, MIXED
 
 CARMAN: Final = KOZENY_CARMAN
 """Constant that the paper has in its eq. 3: P. C. Carman, Trans. Inst. Chem. Eng. 15 (1937) 150."""
@@ -54,13 +54,13 @@ def van_der_hoef(porosity: FloatArray) -> FloatArray:
     return np.asarray(CARMAN + 18.0 * porosity**4 * (1.0 + 1.5 * np.sqrt(solids)) / solids)
 
 
-def spread(table: pd.DataFrame) -> Spread:
-    """Relative standard deviation of A of packings of one kind, times the root of their effective spheres.
+def spread(table: pd.DataFrame, kind: str = BED) -> Spread:
+    """Relative standard deviation of A of one packing, times the root of its effective spheres.
 
-    Pooled over the mixed cases; it includes what the nodes' places add.
+    Pooled over the cases of a kind, each about its own mean; it includes what the nodes' places add.
     """
     squares, freedom = 0.0, 0.0
-    for _, rows in table[table["kind"].isin(MIXED)].groupby("case"):
+    for _, rows in table[table["kind"] == kind].groupby("case"):
         constant, weight = np.log(rows["kozeny_constant"]), rows["effective_spheres"]
         squares += float(np.sum(weight * (constant - np.average(constant, weights=weight)) ** 2))
         freedom += len(rows) - 1.0
@@ -77,11 +77,12 @@ def by_case(table: pd.DataFrame) -> pd.DataFrame:
         packings, relative), numerical_ci95 (relative), ci95 (both, absolute), eq3 and eq3_ci95 (the same by eq. 3's
         mean) and too_high (relative excess of eq. 3 with Carman's constant).
     """
-    pooled = spread(table)
+    beds, cells = (spread(table, kind) for kind in MIXED)
+    spreads = {BED: beds, FINER: beds, CELL: cells, LAYERED: cells, LATTICE: Spread(0.0, math.inf)}
     rows = []
     for (case, kind, label), packings in table.groupby(["case", "kind", "label"], sort=False):
-        between = quantile(pooled.freedom) * pooled.sd / math.sqrt(float(packings["effective_spheres"].sum()))
-        between = 0.0 if kind == LATTICE else between
+        one = spreads[str(kind)]
+        between = quantile(one.freedom) * one.sd / math.sqrt(float(packings["effective_spheres"].sum()))
         numerical = float(np.hypot(packings["resolution"], packings["convergence"]).mean())
         constant, eq3 = float(packings["kozeny_constant"].mean()), float(packings["kozeny_constant_eq3"].mean())
         whole = math.hypot(between, numerical)
@@ -296,8 +297,14 @@ def papers_mixture(constant: float) -> dict[str, float]:
     return {**found, "simulated_porosity": PAPERS_POROSITY}
 
 
+def usual_beds(cases: pd.DataFrame) -> pd.DataFrame:
+    """Select the settled beds that are no wider than a crystallizer's product."""
+    return cases[(cases["kind"] == BED) & (cases["ratio"] <= MSMPR_RATIO)]
+
+
 SETS: Final[dict[str, Callable[[pd.DataFrame], pd.DataFrame]]] = {
     "beds": mixed_beds,
+    "beds of a ratio up to 1.5": usual_beds,
     "beds and hard spheres": mixed,
 }
 

@@ -38,11 +38,14 @@ def draw(cases: pd.DataFrame) -> Figure:
         _points(width, rows, "ratio", column, look)
         if kind != LAYERED:
             _points(pores, rows, "porosity", column, look)
+    ratio, mean = np.geomspace(1.0, 2.5, 50), float(cases.loc[cases["kind"] == BED, "constant"].mean())
+    width.plot(ratio, mean / ratio, color=style.colour(1), linewidth=0.9, label=f"{mean:.0f} over the width")
     porosity = np.linspace(0.40, 0.70, 50)
     pores.plot(
         porosity, van_der_hoef(porosity), color=style.INK, linewidth=0.9, label="van der Hoef et al., hard spheres"
     )
     width.set_xscale("log")
+    width.set_xlim(0.97, 2.6)
     width.set_xticks([1.0, 1.2, 1.5, 2.0, 2.5], ["1", "1.2", "1.5", "2", "2.5"])
     width.minorticks_off()
     width.set_xlabel("Width of the sizes: Σx/d² over (Σx/d)²")
@@ -68,5 +71,5 @@ def _points(axes: Axes, rows: pd.DataFrame, x: str, column: str, look: tuple[str
         capsize=2.0,
         elinewidth=0.8,
         label=label,
-        zorder=3,
+        zorder=4 if column == "constant" else 3,
     )
