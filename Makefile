@@ -121,7 +121,7 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 	$(if $(QUICK),,install -m 644 results/benchmark/images/stability_maps.png docs/images/)
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.csv docs/data/)
 
-permeability: setup ## Stokes flow through packings, the evidence on the resistance law: docs/permeability.md (about 45 min on one core; goes on where it was stopped)
+permeability: setup ## Stokes flow through packings, the evidence on the resistance law: docs/permeability.md (about 40 min on one core; goes on where it was stopped)
 	$(PERMEABILITY)
 
 pages: setup ## redraw docs/benchmark.md, docs/stability.md and docs/permeability.md from the tables in docs/data

@@ -154,13 +154,14 @@ def permeability(template: Path, table: pd.DataFrame, second: pd.DataFrame) -> s
     """
     averages = resistance_law.by_case(table)
     kinds = {kind: averages[averages["kind"] == kind] for kind in (BED, CELL, LAYERED, LATTICE)}
-    pooled = resistance_law.spread(table)
+    layers = resistance_law.layers_by_law(averages)
     return _render(
         template,
         beds=_records(kinds[BED]),
         one={row["case"]: row for row in _records(averages)},
         cells=_records(kinds[CELL].assign(known=resistance_law.van_der_hoef(kinds[CELL]["porosity"].to_numpy()))),
-        layers=_records(resistance_law.layers_over_mixed(averages)),
+        layers=_records(layers),
+        layer_error=float((layers["slices"] / layers["constant"] - 1.0).abs().max()),
         lattices=[{**row, "known": known_constant(row["label"], row["porosity"])} for row in _records(kinds[LATTICE])],
         sets={
             name: {
@@ -173,7 +174,7 @@ def permeability(template: Path, table: pd.DataFrame, second: pd.DataFrame) -> s
         },
         finer=_records(resistance_law.finer(table)),
         narrow=int((kinds[BED]["ci95"] <= 0.03 * kinds[BED]["constant"]).sum()),
-        spread=pooled,
+        spread=resistance_law.spread(table),
         spread_used=SPREAD,
         paper=resistance_law.papers_mixture(float(kinds[BED].set_index("case")["constant"]["pmma_25_75"])),
         msmpr=resistance_law.MSMPR_RATIO,

@@ -220,9 +220,9 @@ def layered(pairs: int, seed: Sequence[int], sweeps: int = LAYER_SWEEPS) -> Geom
 def series(position: FloatArray, radius: FloatArray, box: FloatArray) -> float:
     """Resistance of slices in series over that of the whole cell, Carman's law for each of them.
 
-    Slices are one of the finest diameters thick.
+    Slices are one of the largest diameters thick: thinner ones cut coarse spheres into porosities that no flow sees.
     """
-    count = round(float(box[2]) / (2.0 * float(radius.min()))) * SUBSLICES
+    count = round(float(box[2]) / (2.0 * float(radius.max()))) * SUBSLICES
     heights = (np.arange(count) + 0.5) / count * box[2]
     away = heights[None, :] - position[:, 2, None]
     away -= box[2] * np.round(away / box[2])
@@ -272,7 +272,10 @@ def solve_all(folder: Path, chosen: Iterable[Case], say: Say = lambda _: None) -
 
 
 def solve(folder: Path, case: Case, say: Say = lambda _: None) -> list[dict[str, Any]]:
-    """Make and solve the packings of one case; rows of ``COLUMNS``."""
+    """Make and solve the packings of one case; rows of ``COLUMNS``.
+
+    What is kept goes by the name of the case alone: after a change to a case, its files must go.
+    """
     rows = []
     for replicate in range(case.replicates):
         kept = folder / f"{case.name}_{replicate}.json"

@@ -29,8 +29,8 @@ ERGUN: Final = 150.0
 """S. Ergun, Chem. Eng. Prog. 48 (1952) 89."""
 REFERENCE_POROSITY: Final = 0.35
 """Porosity at which fits with different exponents are compared."""
-MIXTURE: Final = "hard_mixed"
-"""Case with the spheres of the layers."""
+MIXTURE, ONE_SIZE = "hard_mixed", "hard_0.50"
+"""Cases of hard spheres with the spheres of the layers, and of one size with as much solids."""
 MSMPR_RATIO: Final = math.gamma(4.0) * math.gamma(2.0) / math.gamma(3.0) ** 2
 """Sum of x/d^2 over (sum of x/d)^2 of an MSMPR crystallizer's product, all of it: x goes as d^3 exp(-d/(G tau))."""
 PAPERS_POROSITY: Final = 0.358
@@ -245,20 +245,19 @@ def mixed(cases: pd.DataFrame) -> pd.DataFrame:
     return cases[cases["kind"].isin(MIXED)]
 
 
-def layers_over_mixed(cases: pd.DataFrame) -> pd.DataFrame:
-    """Hold layers against the same spheres mixed.
+def layers_by_law(cases: pd.DataFrame) -> pd.DataFrame:
+    """Hold layers, and the same spheres mixed, against three laws.
 
     Returns
     -------
     DataFrame
-        The layered rows of :func:`by_case` with ``over_mixed``, A over that of the mixture, and over_mixed_ci95. By
-        Carman's law for the whole cell it is 1, by eq. 3 ``ratio``, by Carman's law for slices in series ``slices``.
+        The layered rows of :func:`by_case` and the mixture's, with the Sauter mean's A that they would have by Carman's
+        law for the whole cell (``carman``: that of one size), by eq. 3 for the whole cell (``additive``), and by
+        Carman's law for slices in series (``slices``).
     """
-    reference = cases[cases["case"] == MIXTURE].iloc[0]
-    layers = cases[cases["kind"] == LAYERED]
-    over = layers["constant"] / reference["constant"]
-    half = over * np.hypot(layers["packings_ci95"], reference["packings_ci95"])
-    return layers.assign(over_mixed=over, over_mixed_ci95=half, slices=layers["series"] / reference["series"])
+    one = float(cases.loc[cases["case"] == ONE_SIZE, "constant"].iloc[0])
+    rows = cases[(cases["kind"] == LAYERED) | (cases["case"] == MIXTURE)]
+    return rows.assign(carman=one, additive=one * rows["ratio"], slices=one * rows["series"])
 
 
 def finer(table: pd.DataFrame) -> pd.DataFrame:

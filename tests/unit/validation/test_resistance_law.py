@@ -10,7 +10,7 @@ import pytest
 
 from filtercake.validation import resistance_law
 from filtercake.validation.permeability import BED, CELL, COLUMNS, LATTICE, LAYERED
-from filtercake.validation.resistance_law import by_case, fit, fit_table, layers_over_mixed, overall, spread
+from filtercake.validation.resistance_law import by_case, fit, fit_table, layers_by_law, overall, spread
 
 
 def rows(constant: float, exponent: float, width: float, *, noise: float = 0.0, cases: int = 12) -> pd.DataFrame:
@@ -83,21 +83,21 @@ def test_the_one_constant_covers_a_distribution_taken_at_random() -> None:
     assert covered / 2000 == pytest.approx(0.95, abs=0.02)
 
 
-def test_layers_are_held_against_the_mixture() -> None:
+def test_layers_and_their_mixture_are_held_against_three_laws() -> None:
     cases = pd.DataFrame(
         {
-            "case": ["hard_mixed", "layers_2"],
-            "kind": [CELL, LAYERED],
-            "ratio": [1.25, 1.25],
-            "series": [1.1, 1.32],
-            "constant": [180.0, 216.0],
-            "packings_ci95": [0.02, 0.02],
+            "case": ["hard_0.50", "layers_2", "hard_mixed"],
+            "kind": [CELL, LAYERED, CELL],
+            "ratio": [1.0, 1.25, 1.25],
+            "series": [1.0, 1.2, 1.03],
+            "constant": [180.0, 216.0, 185.0],
         }
     )
-    row = layers_over_mixed(cases).iloc[0]
-    assert row["over_mixed"] == pytest.approx(1.2)
-    assert row["over_mixed_ci95"] == pytest.approx(1.2 * np.hypot(0.02, 0.02))
-    assert row["slices"] == pytest.approx(1.2)
+    found = layers_by_law(cases)
+    assert found["case"].tolist() == ["layers_2", "hard_mixed"]
+    assert found["carman"].tolist() == [180.0, 180.0]
+    assert found["additive"].tolist() == [225.0, 225.0]
+    assert found["slices"].tolist() == pytest.approx([216.0, 185.4])
 
 
 def test_lattices_and_layers_take_no_part_in_the_fits() -> None:
