@@ -14,6 +14,7 @@ FLOORS = (
     GROUND,
     ("crystals",),
     ("packing", "filtration"),
+    ("permeability",),
     ("study",),
     ("results",),
     ("calibration", "run"),
