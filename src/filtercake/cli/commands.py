@@ -52,7 +52,7 @@ EXAMPLES = {
     "rerun": "filtercake rerun report",
     "estimate": "filtercake estimate config/studies/pmma.yaml --cores 100",
     "porosity": "filtercake porosity packing/r0.npz --profile",
-    "permeability": "filtercake permeability packing/r0.npz packing/r1.npz --accuracy 0.05",
+    "permeability": "filtercake permeability packing/r0.npz --accuracy 0.05",
     "test": "filtercake test config/measurements/synthetic_tests.yaml",
     "filter-area": (
         "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 "

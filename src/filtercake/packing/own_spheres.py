@@ -7,6 +7,7 @@ The file holds ``position`` (n, 3) and ``radius`` (n,), and either ``length``, t
 from __future__ import annotations
 
 import io
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -32,7 +33,10 @@ ROUNDING: Final = 1e-6
 """Share of a side by which spheres may lie outside, and sides be off a whole multiple."""
 LEAST_SOLIDS, MOST_SOLIDS = 0.001, 0.95
 """Volume of the spheres over that of their box beyond which the two are in different units."""
-_UNREADABLE = (ValueError, OSError, EOFError, LookupError, RuntimeError, ArithmeticError, MemoryError, zlib.error)
+_UNREADABLE = (
+    *(ValueError, OSError, EOFError, LookupError, RuntimeError, ArithmeticError, MemoryError),
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError, SyntaxError),
+)
 
 
 @dataclass(frozen=True)
@@ -110,14 +114,14 @@ def _refuse(origin: str, found: Found) -> None:
 
 def _arrays(content: bytes) -> dict[str, Any]:
     """Take the arrays out of a file's content; nothing in it is run, and what unpacks to too much is refused."""
+    if not zipfile.is_zipfile(io.BytesIO(content)):
+        raise Unusable("must be an .npz file, as numpy.savez writes it")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             if sum(member.file_size for member in archive.infolist()) > LARGEST_FILE:
                 raise Unusable(f"must unpack to at most {LARGEST_FILE // 10**6} MB")
         with np.load(io.BytesIO(content), allow_pickle=False) as data:
             return {name: data[name] if name in SHAPES else None for name in data.files}
-    except zipfile.BadZipFile:
-        raise Unusable("must be an .npz file, as numpy.savez writes it") from None
     except _UNREADABLE as error:
         raise Unusable(f"cannot be read: {shown(str(error))}") from None
 
