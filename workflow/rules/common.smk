@@ -183,6 +183,21 @@ def partition():
     )
 
 
+def flow_memory_mb(wildcards):
+    accuracy = study_of(wildcards).model.permeability.accuracy
+    return estimate.flow_memory_mb(point_of(wildcards).scene, accuracy)
+
+
+def solved_flows(wildcards):
+    """Records of the flow of every point, where the study has it solved."""
+    if study_of(wildcards).model.permeability is None:
+        return []
+    return [
+        f"{RESULTS}/{wildcards.study}/permeability/{point}/permeability.json"
+        for point in KNOWN_POINTS[wildcards.study]
+    ]
+
+
 def granted_minutes():
     """Longest walltime of a submission."""
     limit = partition() and partition().longest_minutes

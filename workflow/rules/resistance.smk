@@ -27,6 +27,7 @@ rule replicates:
     input:
         manifests=manifests,
         csds=csd_tables,
+        flows=solved_flows,
     output:
         "{results}/{study}/replicates.csv",
     log:

@@ -9,10 +9,11 @@ from filtercake.run.job import job
 from filtercake.study.points import Point
 
 
-def main(points, packings, csd_tables, sphericity, law, output):
+def main(points, folder, csd_tables, asked, flows, output):
     """Measure and write the table."""
     csds = read_tables(csd_tables)
-    table = replicates_table(points, packings, csds, sphericity, law)
+    solved = folder / "permeability" if flows else None
+    table = replicates_table(points, folder / "packings", csds, asked.sphericity, asked.law, solved)
     with publish(output) as temporary:
         table.to_csv(temporary, index=False)
 
@@ -20,9 +21,9 @@ def main(points, packings, csd_tables, sphericity, law, output):
 with job(snakemake.log[0], snakemake.output):
     main(
         [Point.from_dict(values) for values in snakemake.params.points],
-        Path(snakemake.output[0]).parent / "packings",
+        Path(snakemake.output[0]).parent,
         snakemake.input.csds,
-        snakemake.params.sphericity,
-        snakemake.params.law,
+        snakemake.params,
+        snakemake.input.flows,
         Path(snakemake.output[0]),
     )

@@ -24,7 +24,7 @@ from filtercake.calibration.rounds import BATCHES, Candidate, Settings
 from filtercake.calibration.units_check import unit_problems
 from filtercake.errors import ConfigError, Problem, shown
 from filtercake.filtration.constant_pressure import CompressibilityFit
-from filtercake.filtration.resistance import implied_porosity
+from filtercake.filtration.resistance import implied_porosity, law_of
 from filtercake.packing import contact_law
 from filtercake.statistics import quantile
 from filtercake.study.config.packing import EngineName
@@ -368,6 +368,11 @@ def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements
     packed = len({*model.predict, *(item.csd for item in measurements.measurements)})
     frictions = len(model.fit_friction or [0, *(model.rival_friction or [0])])
     points = packed * len(model.cohesion_kJ_m3.values()) * frictions * BATCHES
+    if law_of(study.model.resistance_law).needs_kozeny_constant:
+        allowed = (
+            f"its resistance_law is {study.model.resistance_law}, which no calibration solves: use carman or additive"
+        )
+        yield Problem(str(path), "study", shown(model.study), allowed)
     if points > MOST_POINTS:
         allowed = f"must be at most {MOST_POINTS} points: use a larger step, fewer frictions or distributions"
         yield Problem(str(path), "cohesion_kJ_m3.step", f"{points} points", allowed)

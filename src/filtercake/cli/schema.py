@@ -21,6 +21,7 @@ from filtercake.study.config.crystals import Crystallizer, Csd, Lognormal, Rosin
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
+from filtercake.study.config.permeability import Permeability
 from filtercake.study.config.published import Published
 from filtercake.study.config.study import Study, Workflow
 from filtercake.study.config.sweep import Sweep
@@ -85,7 +86,7 @@ def study_template() -> str:
         f"    # {meaning(Csd.model_fields['truncate_above_um'])}",
         "    # truncate_above_um: 500",
     ]
-    for part, optional in (("crystallizer", Crystallizer), ("filter", Filter)):
+    for part, optional in (("crystallizer", Crystallizer), ("filter", Filter), ("permeability", Permeability)):
         lines += ["", f"# {meaning(Study.model_fields[part])}", f"# {part}:"]
         for key, field in optional.model_fields.items():
             lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")
@@ -131,6 +132,7 @@ def reference() -> str:
         ("`filter`", Filter),
         ("`material`", Material),
         ("`packing`", Packing),
+        ("`permeability`", Permeability),
         ("`sweeps[]`", Sweep),
         ("`published[]`", Published),
         ("A calibration: `config/calibrations/<name>.yaml`", Calibration),

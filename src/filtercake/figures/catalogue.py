@@ -62,6 +62,10 @@ def _crystallizes(study: Study) -> bool:
     return study.crystallizer is not None
 
 
+def _solves_flow(study: Study) -> bool:
+    return study.permeability is not None
+
+
 def _filters(study: Study) -> bool:
     return study.filter is not None
 
@@ -80,6 +84,7 @@ FIGURES: dict[str, FigureSpec] = {
         "sensitivity", lambda points: _varies("poisson_ratio")(points) or _varies("restitution")(points)
     ),
     "packing_cross_section": FigureSpec("cross_section"),
+    "packing_flow": FigureSpec("flow", needs=_solves_flow),
     "packing_porosity_profile": FigureSpec("profile"),
 }
 """Figures of studies."""

@@ -12,8 +12,9 @@ from matplotlib.lines import Line2D
 
 from filtercake.figures import selection, style
 from filtercake.figures.selection import StudyData
-from filtercake.filtration.resistance import resistance
+from filtercake.filtration.resistance import law_of, resistance
 from filtercake.study.config.published import Published
+from filtercake.study.points import base_rows
 
 MARGIN = 0.025
 """Porosity drawn beyond the outermost value."""
@@ -59,7 +60,16 @@ def draw(data: StudyData) -> Figure:
 
 def _resistance(data: StudyData, csd: str, porosity: float) -> float:
     material, law = data.study.material, data.study.resistance_law
-    return resistance(law, porosity, data.csds[csd][0], material.density, material.sphericity)
+    constant = _solved_constant(data, csd) if law_of(law).needs_kozeny_constant else None
+    return resistance(law, porosity, data.csds[csd][0], material.density, material.sphericity, constant)
+
+
+def _solved_constant(data: StudyData, csd: str) -> float:
+    """Kozeny constant of the base point of a distribution, the mean of all its points where there is none."""
+    rows = data.summary[data.summary["csd"] == csd]
+    base = base_rows(data.study, rows)
+    found = (base if base["kozeny_constant"].notna().any() else rows)["kozeny_constant"]
+    return float(found.mean())
 
 
 def _ink(data: StudyData, csd: str) -> str:

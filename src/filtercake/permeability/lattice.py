@@ -99,12 +99,6 @@ class Lattice:
         return np.bincount(self.layer[: self.fluid], minlength=self.shape[0])
 
 
-def bytes_needed(box: FloatArray, spacing: float, porosity: float, float_bytes: int = 4) -> float:
-    """Memory that a lattice and its flow take, bytes: places of the fluid, and a number for every node of the box."""
-    nodes = float(np.prod(box)) / spacing**3
-    return nodes * porosity * (DIRECTIONS * (float_bytes + 4 + 1) + float_bytes + 4) + nodes * 4
-
-
 def build(spheres: Spheres, across: int, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Lattice:
     """Lay a lattice over spheres: a node inside any of them is solid, overlapping spheres are their union.
 

@@ -19,29 +19,27 @@ import scipy
 
 from filtercake.errors import FiltercakeError
 from filtercake.packing.slab import Slab, interior_slab, why_too_thin
-from filtercake.permeability.lattice import Lattice, Spheres, build, bytes_needed
+from filtercake.permeability.lattice import Lattice, Spheres, build
+from filtercake.permeability.resolution import (
+    ACCURACY,
+    COARSEST_ACCURACY,
+    FINEST_ACCURACY,
+    LEVELS,
+    ORDER,
+    bytes_needed,
+    spacing,
+)
+from filtercake.permeability.result import Level, Permeability, Picture
 from filtercake.permeability.stokes import Flow
 from filtercake.statistics import quantile
 from filtercake.units import FloatArray, IntArray, duration
 
-ACCURACY: Final = 0.02
-"""Relative half-width of the numerical error that is asked for by default."""
-FINEST_ACCURACY: Final = 0.003
-COARSEST_ACCURACY: Final = 0.2
-PORE_NODES: Final = 0.8
-"""Pore radius in nodes of the second lattice at the default accuracy."""
-LEVELS: Final = (2, 3, 4, 6)
-"""Nodes of the lattices in units of the box; the third and fourth only where the first two differ too much."""
-ORDER: Final = 2.0
-"""Power of the spacing with which errors fall."""
 DOUBT: Final = 0.5
 """Share of the difference of the two finest lattices that is still in doubt."""
 REMAINDER: Final = 0.006
 """Relative half-width, on the second lattice by default, of what both lattices have in common."""
 ALIGNMENT: Final = 0.03
 """Relative half-width, on the second lattice by default, of what depends on where the nodes lie in one sphere."""
-FEWEST_DIAMETERS: Final = 6.0
-"""Nodes per Sauter mean diameter of the second lattice, however wide the pores are."""
 FREE_UNITS: Final = 2
 """Layers of fluid under and over a bed, in units: six fine nodes."""
 CHUNK: Final = 50
@@ -52,97 +50,6 @@ SPREAD: Final = 0.35
 """Relative standard deviation of the Kozeny constant of packings of one kind, times the root of their spheres."""
 
 Report = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Level:
-    """The flow on one lattice.
-
-    Attributes
-    ----------
-    across : int
-        Nodes along the side of the box.
-    diameters_per_spacing : float
-        Sauter mean diameter over the spacing.
-    permeability : float
-        m2.
-    convergence : float
-        Relative change still to come when it was stopped.
-    steps, nodes : int
-        Time steps, and fluid nodes.
-    """
-
-    across: int
-    diameters_per_spacing: float
-    permeability: float
-    convergence: float
-    steps: int
-    nodes: int
-
-
-@dataclass(frozen=True)
-class Permeability:
-    """Permeability of a packing, and its error budget: relative 95 % half-widths.
-
-    Attributes
-    ----------
-    permeability : float
-        m2, on the finest lattice.
-    porosity, sauter_diameter : float
-        Of the same slab with the same weights; overlapping spheres are their union, m.
-    kozeny_constant : float
-        A of ``k = eps^3 D^2 / (A (1 - eps)^2)``, D the Sauter mean diameter.
-    resolution, convergence : float
-        What the lattice, and stopping, leave open for this very packing.
-    slab : float
-        How far the constant of one such packing is from that of a large one, by the number of its spheres.
-    levels : tuple of Level
-        Coarse to fine.
-    seconds, memory_bytes : float
-        What it took.
-    """
-
-    permeability: float
-    porosity: float
-    sauter_diameter: float
-    kozeny_constant: float
-    resolution: float
-    convergence: float
-    slab: float
-    levels: tuple[Level, ...]
-    seconds: float = 0.0
-    memory_bytes: float = 0.0
-
-    @property
-    def numerical_ci95(self) -> float:
-        """Relative half-width for this very packing."""
-        return math.hypot(self.resolution, self.convergence)
-
-    @property
-    def relative_ci95(self) -> float:
-        """Relative half-width for a large packing of its kind."""
-        return math.hypot(self.numerical_ci95, self.slab)
-
-    def resistance(self, density: float) -> float:
-        """Specific cake resistance ``1 / (k rho (1 - eps))`` of these spheres, m/kg; density in kg/m3."""
-        return 1.0 / (self.permeability * density * (1.0 - self.porosity))
-
-
-@dataclass(frozen=True)
-class Picture:
-    """Speed in an upright cut through the middle of the packing.
-
-    Attributes
-    ----------
-    speed : ndarray, shape (nz, nx)
-        Over the superficial velocity; nan in spheres.
-    spacing, bottom : float
-        Distance of nodes and height of the lowest, m.
-    """
-
-    speed: FloatArray
-    spacing: float
-    bottom: float
 
 
 @dataclass(frozen=True)
@@ -284,10 +191,7 @@ def _converge(domain: Domain, accuracy: float, threads: int, say: Report) -> tup
 def _units(length: float, porosity: float, sauter: float, accuracy: float) -> int:
     if not FINEST_ACCURACY <= accuracy <= COARSEST_ACCURACY:
         raise FiltercakeError(f"accuracy = {accuracy:g}: must be {FINEST_ACCURACY:g} to {COARSEST_ACCURACY:g}")
-    pore_radius = porosity * sauter / (6.0 * (1.0 - porosity))
-    widest = min(pore_radius / PORE_NODES, sauter / FEWEST_DIAMETERS)
-    spacing = widest * float((accuracy / ACCURACY) ** (1.0 / ORDER))
-    return max(2, math.ceil(length / spacing / LEVELS[1]))
+    return max(2, math.ceil(length / spacing(porosity, sauter, accuracy) / LEVELS[1]))
 
 
 def _kozeny_constant(permeability: float, porosity: float, sauter: float) -> float:
@@ -299,8 +203,8 @@ def _resolution(levels: list[Level], spheres: float, accuracy: float) -> float:
     coarse, fine = levels[-2:]
     difference = DOUBT * (fine.permeability / coarse.permeability - 1.0)
     # the spacing over that of the second lattice at the default accuracy
-    spacing = LEVELS[1] / LEVELS[0] * levels[0].across / fine.across * (accuracy / ACCURACY) ** (1.0 / ORDER)
-    common = math.hypot(REMAINDER, ALIGNMENT / math.sqrt(spheres)) * spacing**ORDER
+    coarser = LEVELS[1] / LEVELS[0] * levels[0].across / fine.across * (accuracy / ACCURACY) ** (1.0 / ORDER)
+    common = math.hypot(REMAINDER, ALIGNMENT / math.sqrt(spheres)) * coarser**ORDER
     return math.hypot(difference, common)
 
 

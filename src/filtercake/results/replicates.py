@@ -15,16 +15,24 @@ from filtercake.filtration.resistance import ADDITIVE
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, read_record
+from filtercake.permeability.replicates import RECORD, constant_of, read_solved
 from filtercake.results.resistance_columns import LAW, LAW_CI95, RESISTANCES, resistance_columns
 from filtercake.statistics import half_width
 from filtercake.study.points import POINT_COLUMNS, Point
 from filtercake.units import MICROMETRE
+
+Solved = Mapping[int, Mapping[str, Any]]
+"""What the flow through packings was found to be, by replicate."""
+NOTHING_SOLVED: Solved = {}
 
 MEASURED = (
     "porosity",
     "porosity_paper_count",
     *RESISTANCES,
 )
+
+FLOW = ("permeability_m2", "kozeny_constant", "flow_numerical_ci95", "flow_slab_ci95")
+"""Of solved packings: the two, and the relative half-widths of the numerics and of a packing's size."""
 
 REPLICATE_COLUMNS = (
     *POINT_COLUMNS,
@@ -36,6 +44,7 @@ REPLICATE_COLUMNS = (
     *MEASURED,
     LAW,
     LAW_CI95,
+    *FLOW,
     "porosity_from_floor",
     "soft_contact_compaction",
     "pull_off_over_weight",
@@ -64,9 +73,16 @@ SUMMARY_COLUMNS = (
     "resistance_additive_ci95_m_kg",
     "resistance_carman_m_kg",
     "resistance_carman_ci95_m_kg",
+    "resistance_stokes_m_kg",
+    "resistance_stokes_ci95_m_kg",
     "resistance_sauter_m_kg",
     "resistance_sauter_ci95_m_kg",
     "resistance_truncated_m_kg",
+    "n_flow",
+    "permeability_m2",
+    "permeability_ci95_m2",
+    "kozeny_constant",
+    "kozeny_constant_ci95",
     "soft_contact_compaction",
     "pull_off_over_weight",
     "overlap_max",
@@ -75,7 +91,12 @@ SUMMARY_COLUMNS = (
 
 
 def replicate_row(
-    point: Point, packing: Packing, csd: FullAndTruncated, sphericity: float, law: str = ADDITIVE
+    point: Point,
+    packing: Packing,
+    csd: FullAndTruncated,
+    sphericity: float,
+    law: str = ADDITIVE,
+    flows: Solved = NOTHING_SOLVED,
 ) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
@@ -91,7 +112,8 @@ def replicate_row(
         "settled": record["settled"],
         "porosity": found.interior,
         "porosity_paper_count": found.paper_count,
-        **resistance_columns(law, found.interior, csd, point.scene.density, sphericity),
+        **resistance_columns(law, found.interior, csd, point.scene.density, sphericity, constant_of(flows.values())),
+        **_flow(flows.get(record["replicate"])),
         "porosity_from_floor": found.from_floor,
         "soft_contact_compaction": found.compaction,
         "pull_off_over_weight": point.scene.pull_off_over_weight,
@@ -112,6 +134,7 @@ def replicate_rows(
     csd: FullAndTruncated,
     sphericity: float,
     law: str = ADDITIVE,
+    flows: Solved = NOTHING_SOLVED,
 ) -> Iterator[dict[str, Any]]:
     """Measure a point's packings in its folder; a failed or damaged one is a row with a reason, blank but for that."""
     for outcome in outcomes:
@@ -119,7 +142,7 @@ def replicate_rows(
         if outcome.status == "ok":
             try:
                 packing = Packing.load(folder / f"r{outcome.replicate}.npz")
-                yield replicate_row(point, packing, csd, sphericity, law)
+                yield replicate_row(point, packing, csd, sphericity, law, flows)
                 continue
             except PackingRejected as error:
                 reason = str(error)
@@ -133,16 +156,19 @@ def replicates_table(
     csds: Mapping[str, FullAndTruncated],
     sphericity: float,
     law: str = ADDITIVE,
+    solved: Path | None = None,
 ) -> pd.DataFrame:
     """Measure every packing of a study, ``REPLICATE_COLUMNS``.
 
-    ``packings`` holds one folder per point; ``sphericity`` and ``law`` are the study's, for the resistance.
+    ``packings`` holds one folder per point; ``sphericity`` and ``law`` are the study's, for the resistance;
+    ``solved`` holds one folder per point with what its flow was found to be, where it was solved.
     """
     rows: list[dict[str, Any]] = []
     for point in points:
         folder = packings / point.name
         outcomes = [Outcome(**entry) for entry in read_record(folder / MANIFEST)["replicates"]]
-        rows += replicate_rows(point, outcomes, folder, csds[point.csd], sphericity, law)
+        flows = NOTHING_SOLVED if solved is None else read_solved(solved / point.name / RECORD)
+        rows += replicate_rows(point, outcomes, folder, csds[point.csd], sphericity, law, flows)
     return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
 
 
@@ -164,9 +190,31 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
         row[LAW] = group.iloc[0][LAW]
         for column in (LAW_CI95, "soft_contact_compaction", "pull_off_over_weight"):
             row[column] = good[column].mean()
+        row.update(_mean_flow(good))
         row["overlap_max"] = good["overlap_max"].max()
         rows.append(row)
     return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
+
+
+def _flow(found: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Give the flow through one packing, ``FLOW``; blank where it was not solved."""
+    if found is None:
+        return dict.fromkeys(FLOW)
+    return dict(
+        zip(FLOW, (found[key] for key in ("permeability", "kozeny_constant", "numerical_ci95", "slab")), strict=True)
+    )
+
+
+def _mean_flow(good: pd.DataFrame) -> dict[str, Any]:
+    """Mean flow of a point's packings, with half-widths of the numerics and of how many spheres there were."""
+    found = good.dropna(subset=["kozeny_constant"])
+    if found.empty:
+        return {"n_flow": 0}
+    slab = np.sqrt(np.sum(found["flow_slab_ci95"] ** 2)) / len(found)
+    relative = float(np.hypot(slab, found["flow_numerical_ci95"].mean()))
+    mean = {name: float(found[name].mean()) for name in FLOW[:2]}
+    intervals = {_interval_name(name): relative * value for name, value in mean.items()}
+    return {"n_flow": len(found), **mean, **intervals}
 
 
 def _reached(half: float, asked: float) -> str:
@@ -177,4 +225,7 @@ def _reached(half: float, asked: float) -> str:
 
 
 def _interval_name(column: str) -> str:
-    return column.replace("_m_kg", "_ci95_m_kg") if column.endswith("_m_kg") else f"{column}_ci95"
+    name, unit = next(
+        ((column.removesuffix(unit), unit) for unit in ("_m_kg", "_m2") if column.endswith(unit)), (column, "")
+    )
+    return f"{name}_ci95{unit}"

@@ -8,6 +8,7 @@ from filtercake.crystals.csd import FullAndTruncated
 from filtercake.filtration.resistance import (
     ADDITIVE,
     CARMAN,
+    STOKES,
     KozenyConstant,
     carman_sauter,
     law_relative_ci95,
@@ -23,6 +24,7 @@ ALWAYS: Final = (ADDITIVE, CARMAN)
 RESISTANCES: Final = (
     "resistance_m_kg",
     *(f"resistance_{law}_m_kg" for law in ALWAYS),
+    f"resistance_{STOKES}_m_kg",
     "resistance_sauter_m_kg",
     "resistance_truncated_m_kg",
 )
@@ -45,7 +47,8 @@ def resistance_columns(
     """Resistances of a cake by column: ``LAW``, ``RESISTANCES`` and ``LAW_CI95``.
 
     ``resistance_m_kg`` is by the study's law with the full distribution, ``resistance_truncated_m_kg`` by the same law
-    with the packed classes alone; ``resistance_sauter_m_kg`` is Carman's form with eq. 3's constant.
+    with the packed classes alone; ``resistance_stokes_m_kg`` is blank without a constant; ``resistance_sauter_m_kg`` is
+    Carman's form with eq. 3's constant.
 
     Parameters
     ----------
@@ -73,6 +76,9 @@ def resistance_columns(
         LAW: law,
         "resistance_m_kg": chosen,
         **{f"resistance_{name}_m_kg": resistance(name, porosity, full, *material) for name in ALWAYS},
+        f"resistance_{STOKES}_m_kg": None
+        if kozeny is None
+        else resistance(STOKES, porosity, full, *material, constant),
         "resistance_sauter_m_kg": carman_sauter(porosity, full, *material),
         "resistance_truncated_m_kg": resistance(law, porosity, packed, *material, constant),
         LAW_CI95: chosen * law_relative_ci95(law, full, *known),

@@ -12,10 +12,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.replication import LEAST_REPLICATES
 from filtercake.packing.scene import Scene
+from filtercake.permeability.resolution import LEVELS, bytes_needed, spacing
 from filtercake.statistics import quantile
 from filtercake.study.points import Point
 from filtercake.units import HOUR, MINUTE, duration
@@ -42,6 +45,8 @@ START_SECONDS: Final = 5.0
 EXPECTED_FREEDOM: Final = 8
 """Degrees of freedom of an interval asked for, as it is once reached: about nine packings."""
 
+USUAL_POROSITY: Final = 0.35
+"""Of a bed, where what its flow takes is estimated."""
 BASE_MB: Final = 1200
 """Memory of a job before its first sphere: Snakemake on the node (twice 260 MB), Python with numba (330), and room."""
 SPHERE_MB: Final = 0.005
@@ -156,6 +161,15 @@ def _first_walltime(point: Point) -> int:
 def memory_mb(scene: Scene) -> int:
     """Memory to ask for, MB: measured, with room."""
     return math.ceil(BASE_MB + SPHERE_MB * scene.particles)
+
+
+def flow_memory_mb(scene: Scene, accuracy: float) -> int:
+    """Memory to ask for to solve the flow in a packing, MB: that of the third lattice, in a bed of usual porosity."""
+    sauter = 1.0 / scene.csd.sum_x_over_d
+    height = scene.particles * scene.csd.mean_particle_volume / scene.box_length**2 / (1.0 - USUAL_POROSITY)
+    box = np.array([scene.box_length, scene.box_length, height + scene.csd.largest])
+    finest = spacing(USUAL_POROSITY, sauter, accuracy) * LEVELS[1] / LEVELS[2]
+    return math.ceil(BASE_MB + bytes_needed(box, finest, USUAL_POROSITY) / 1e6)
 
 
 def group_size(point: Point, *, granted: int = LONGEST_MINUTES) -> int:

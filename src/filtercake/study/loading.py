@@ -372,10 +372,11 @@ def _bed_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterab
 
 def _law_problems(model: Study, file: str) -> Iterable[Problem]:
     """Laws that need a Kozeny constant, where nothing says that it is solved on the study's packings."""
-    if law_of(model.resistance_law).needs_kozeny_constant:
+    if law_of(model.resistance_law).needs_kozeny_constant and model.permeability is None:
         usable = [law.name for law in RESISTANCE_LAWS.values() if not law.needs_kozeny_constant]
         allowed = (
-            f"needs the flow solved in the study's packings, which a study cannot ask for; allowed: {', '.join(usable)}"
+            "needs the flow solved in the packings: give a section permeability (permeability: {packings: 2}), or "
+            f"use {' or '.join(usable)}"
         )
         yield Problem(file, "resistance_law", repr(model.resistance_law), allowed)
 

@@ -131,9 +131,7 @@ def test_a_coarse_flow_is_near_the_fine_one() -> None:
     settled = permeability(lattice, 2000)
     for flow in (fine, cold):
         flow.run(50)
-    near, far = (
-        abs(float(flow.layers()[1].mean()) * flow.viscosity / 900.0 / settled - 1.0) for flow in (fine, cold)
-    )
+    near, far = (abs(float(flow.layers()[1].mean()) * flow.viscosity / 900.0 / settled - 1.0) for flow in (fine, cold))
     assert near < 0.03 and near < 0.3 * far
 
 

@@ -11,6 +11,7 @@ from filtercake.study.config.crystals import Crystallizer, Csd
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
+from filtercake.study.config.permeability import Permeability
 from filtercake.study.config.published import Published
 from filtercake.study.config.sweep import Sweep
 from filtercake.study.config.values import ENTRIES, LISTED, MOST_VALUES, TO_TEXT, LawName, Model, Name, PathText
@@ -34,7 +35,10 @@ class Study(Model):
     resistance_law: LawName = Field(
         default=ADDITIVE,
         description="Law of the resistance: additive (the paper's eq. 3), carman (Sauter mean, lower for broad "
-        "distributions, nearer to the flow in packings), or stokes (flow solved in the packings).",
+        "distributions, nearer to the flow in packings), or stokes (flow solved in the packings: needs permeability).",
+    )
+    permeability: Permeability | None = Field(
+        default=None, description="Stokes flow solved in packings of every point; left out, it is not."
     )
     packing: Packing = Field(default=Packing(), description="How the packings are made.")
     sweeps: Annotated[list[Sweep], Field(min_length=1, max_length=MOST_VALUES)] = Field(
