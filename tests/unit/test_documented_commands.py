@@ -394,8 +394,8 @@ def test_docstrings_hold_no_example_that_nobody_runs() -> None:
 EXAMPLES = [block for block in blocks(API_PAGE) if block.language == "python"]
 
 
-def test_there_are_three_examples() -> None:
-    assert len(EXAMPLES) == 3
+def test_there_are_four_examples() -> None:
+    assert len(EXAMPLES) == 4
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda block: block.place)

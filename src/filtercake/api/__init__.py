@@ -1,13 +1,21 @@
 """The steps of a study as functions: the one import that a notebook needs.
 
 ``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`porosity`, :func:`profile`,
-:func:`resistance`, :func:`filter_area`, :func:`filtration_test`, :func:`filtration_tests`, :func:`export` and
-:func:`rerun`. It may import from every room but ``cli``, ``report`` and ``validation``.
+:func:`permeability`, :func:`permeabilities`, :func:`resistance`, :func:`filter_area`, :func:`filtration_test`,
+:func:`filtration_tests`, :func:`export` and :func:`rerun`. It may import from every room but ``cli``, ``report``
+and ``validation``.
 """
 
 from filtercake.api.export import Exported, export, first_porosity, rerun
 from filtercake.api.filtration import FiltrationResult, filtration_test, filtration_tests
 from filtercake.api.pack import Bed, pack
+from filtercake.api.permeability import (
+    FlowLevel,
+    PackingPermeability,
+    PermeabilityOptions,
+    permeabilities,
+    permeability,
+)
 from filtercake.api.steps import (
     Distribution,
     FilterOptions,
@@ -29,7 +37,10 @@ __all__ = [
     "FilterOptions",
     "FilterSize",
     "FiltrationResult",
+    "FlowLevel",
+    "PackingPermeability",
     "PackingPorosity",
+    "PermeabilityOptions",
     "Resistance",
     "ResistanceOptions",
     "distribution",
@@ -39,6 +50,8 @@ __all__ = [
     "filtration_tests",
     "first_porosity",
     "pack",
+    "permeabilities",
+    "permeability",
     "porosity",
     "profile",
     "rerun",

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from filtercake import __version__, api
 from filtercake.calibration.measurements import FiltrationConditions
@@ -51,6 +52,7 @@ EXAMPLES = {
     "rerun": "filtercake rerun report",
     "estimate": "filtercake estimate config/studies/pmma.yaml --cores 100",
     "porosity": "filtercake porosity packing/r0.npz --profile",
+    "permeability": "filtercake permeability packing/r0.npz --accuracy 0.05",
     "test": "filtercake test config/measurements/synthetic_tests.yaml",
     "filter-area": (
         "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 "
@@ -107,6 +109,7 @@ def build_parser() -> words.Parser:
     _add_csd(commands)
     _add_pack(commands)
     _add_porosity(commands)
+    _add_permeability(commands)
     _add_resistance(commands)
     _add_filter_area(commands)
     _add_test(commands)
@@ -168,6 +171,23 @@ def _add_porosity(commands: Any) -> None:
     parser.add_argument(
         "--profile", action="store_true", help="porosity over height (um) as well, in slices of 1/20 largest diameter"
     )
+
+
+def _add_permeability(commands: Any) -> None:
+    text = (
+        "Permeability (m2), specific resistance (m/kg) and Kozeny constant of packings, with 95 % intervals, from "
+        "Stokes flow solved in their pores."
+    )
+    parser = _command(commands, "permeability", _run_permeability, text)
+    parser.add_argument(
+        "packings",
+        nargs="+",
+        metavar="NPZ",
+        help="packing with its record (.json) beside it; or spheres of your own: arrays position (n, 3) and radius "
+        "(n,), and either length, of a settled bed (floor at z = 0, x and y periodic), or box (3,), of a cell that is "
+        "periodic in all directions, all in m",
+    )
+    words.add_model(parser.add_argument_group("flow and solid"), api.PermeabilityOptions)
 
 
 def _add_resistance(commands: Any) -> None:
@@ -353,6 +373,48 @@ def _run_porosity(options: argparse.Namespace) -> int:
     if len(found) > 1:
         print(f"mean of {len(found)}: {_number(mean)} +- {_number(half)} (95 %)")
     return 0
+
+
+def _run_permeability(options: argparse.Namespace) -> int:
+    asked = words.given(options, api.PermeabilityOptions.model_fields)
+    found = api.permeabilities(options.packings, say=_say, **asked)
+    mean, half = _mean([item.kozeny_constant for item in found])
+    if options.json:
+        rows = [{"file": npz, **asdict(item)} for npz, item in zip(options.packings, found, strict=True)]
+        return _print_json({"packings": rows, "kozeny_constant": mean, "kozeny_constant_ci95": half})
+    for npz, item in zip(options.packings, found, strict=True):
+        print(f"{npz} ({item.particles} spheres)")
+        _print_permeability(item)
+    if len(found) > 1:
+        print(f"mean Kozeny constant of {len(found)}: {_number(mean)} +- {_number(half)} (95 %, between packings)")
+    return 0
+
+
+def _print_permeability(found: api.PackingPermeability) -> None:
+    alpha = "m/kg; needs --density-kg-m3"
+    if found.density_kg_m3 is not None:
+        alpha = f"{_interval(found.resistance_ci95_m_kg, 'm/kg')} at {found.density_kg_m3:g} kg/m3"
+    share = "% (95 %, half-width)"
+    _print_lines(
+        [
+            ("permeability", found.permeability_m2, _interval(found.permeability_ci95_m2, "m2")),
+            ("resistance", "-" if found.resistance_m_kg is None else found.resistance_m_kg, alpha),
+            ("Kozeny constant", found.kozeny_constant, _interval(found.kozeny_constant_ci95, "")),
+            ("resolution leaves open", 100.0 * found.resolution_relative_ci95, share),
+            ("stopping leaves open", 100.0 * found.convergence_relative_ci95, share),
+            ("so few spheres leave open", 100.0 * found.slab_relative_ci95, f"{share}, of the constant only"),
+            ("porosity of the slab", found.porosity, ""),
+            ("Sauter mean of the slab", found.sauter_mean_um, "um"),
+            ("time", found.wall_s, "s"),
+            ("memory", found.memory_MB, "MB"),
+        ]
+    )
+    levels = [
+        [level.nodes_per_sauter_mean, level.permeability_m2, level.fluid_nodes, level.steps] for level in found.levels
+    ]
+    _print_table(
+        ["nodes per mean diameter", "permeability, m2", "fluid nodes", "steps"], pd.DataFrame(levels, dtype=object)
+    )
 
 
 def _run_resistance(options: argparse.Namespace) -> int:

@@ -1,1 +1,4 @@
-"""Permeability of a packing: Stokes flow solved through its pores, and what follows for the Kozeny constant."""
+"""Permeability of a packing: Stokes flow solved through its pores, and what follows for the Kozeny constant.
+
+Imports from packing and from the ground.
+"""

@@ -32,7 +32,7 @@ DRUM = [
     *["--slurry-concentration-kg-m3", "200", "--pressure-drop-kPa", "53.33", "--submerged-fraction", "0.3"],
     *["--rotation-rate-rpm", "0.2", "--medium-resistance-1-m", "5e9"],
 ]
-COMMANDS = ["csd", "pack", "porosity", "resistance", "filter-area", "test"]
+COMMANDS = ["csd", "pack", "porosity", "permeability", "resistance", "filter-area", "test"]
 ALL_COMMANDS = [*COMMANDS, "export", "rerun"]
 BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
 
@@ -230,6 +230,14 @@ def test_filter_area_and_its_inverse(capsys: Capture) -> None:
         (["filter-area", "--resistance-m-kg", "x", *DRUM], "--resistance-m-kg = x: must be a number"),
         (["porosity", "no/such.npz"], "cannot be read"),
         (["porosity"], "NPZ"),
+        (["permeability"], "NPZ"),
+        (["permeability", ""], "cannot be read"),
+        (["permeability", "no/such.npz"], "no/such.npz: (file): cannot be read"),
+        (
+            ["permeability", "a.npz", "--accuracy", "0.001"],
+            "--accuracy = 0.001: must be greater than or equal to 0.003",
+        ),
+        (["permeability", "a.npz", "--threads", "0"], "--threads = 0: must be greater than or equal to 1"),
         (["porosity", ""], "is not the name"),
         (["csd", *PMMA, "--output", ""], "must be the name of a file"),
         (["porosities"], "invalid choice"),
