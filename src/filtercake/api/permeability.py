@@ -16,7 +16,9 @@ from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Pro
 from filtercake.packing.own_spheres import OwnSpheres, check_spheres, read_spheres
 from filtercake.packing.result import SEAL, Packing, read_record
 from filtercake.permeability import measure
-from filtercake.permeability.measure import ACCURACY, COARSEST_ACCURACY, FINEST_ACCURACY, Report
+from filtercake.permeability.measure import Report
+from filtercake.permeability.resolution import ACCURACY, COARSEST_ACCURACY, FINEST_ACCURACY
+from filtercake.permeability.result import Level, Permeability
 from filtercake.study.config.values import TO_NUMBER, TO_WHOLE, Density, Model
 from filtercake.study.limits import unit_problems
 from filtercake.study.loading import parse
@@ -218,7 +220,7 @@ def _check_units(spheres: OwnSpheres) -> None:
         raise ConfigError(problems)
 
 
-def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> measure.Permeability:
+def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> Permeability:
     position, radius, box = spheres.position, spheres.radius, spheres.box
     how: dict[str, Any] = {
         "accuracy": given.accuracy,
@@ -233,7 +235,7 @@ def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> meas
         raise PackingRejected([f"{spheres.origin}: {error}"]) from None
 
 
-def _result(spheres: OwnSpheres, found: measure.Permeability, sphericity: float) -> PackingPermeability:
+def _result(spheres: OwnSpheres, found: Permeability, sphericity: float) -> PackingPermeability:
     alpha = None if spheres.density is None else found.resistance(spheres.density) / sphericity**2
     numerical = found.numerical_ci95
     return PackingPermeability(
@@ -257,7 +259,7 @@ def _result(spheres: OwnSpheres, found: measure.Permeability, sphericity: float)
     )
 
 
-def _level(level: measure.Level) -> FlowLevel:
+def _level(level: Level) -> FlowLevel:
     return FlowLevel(
         nodes_across=int(level.across),
         nodes_per_sauter_mean=float(level.diameters_per_spacing),

@@ -34,11 +34,9 @@ from filtercake.permeability.stokes import Flow
 from filtercake.statistics import quantile
 from filtercake.units import FloatArray, IntArray, duration
 
-DOUBT: Final = 0.5
-"""Share of the difference of the two finest lattices that is still in doubt."""
 REMAINDER: Final = 0.008
 """Relative half-width, on the second lattice by default, of what both lattices have in common."""
-ALIGNMENT: Final = 0.03
+ALIGNMENT: Final = 0.06
 """Relative half-width, on the second lattice by default, of what depends on where the nodes lie in one sphere."""
 FREE_UNITS: Final = 2
 """Layers of fluid under and over a bed, in units: six fine nodes."""
@@ -201,11 +199,11 @@ def _kozeny_constant(permeability: float, porosity: float, sauter: float) -> flo
 def _resolution(levels: list[Level], spheres: float, accuracy: float) -> float:
     """Relative half-width of the finest lattice's permeability."""
     coarse, fine = levels[-2:]
-    difference = DOUBT * (fine.permeability / coarse.permeability - 1.0)
+    still = (fine.permeability / coarse.permeability - 1.0) / ((fine.across / coarse.across) ** ORDER - 1.0)
     # the spacing over that of the second lattice at the default accuracy
     coarser = LEVELS[1] / LEVELS[0] * levels[0].across / fine.across * (accuracy / ACCURACY) ** (1.0 / ORDER)
     common = math.hypot(REMAINDER, ALIGNMENT / math.sqrt(spheres)) * coarser**ORDER
-    return math.hypot(difference, common)
+    return math.hypot(still, common)
 
 
 def _effective_spheres(domain: Domain) -> float:

@@ -13,13 +13,13 @@ ACCURACY: Final = 0.02
 FINEST_ACCURACY: Final = 0.003
 COARSEST_ACCURACY: Final = 0.2
 """The narrowest and the widest that may be asked for."""
-PORE_NODES: Final = 0.8
+PORE_NODES: Final = 0.9
 """Pore radius in nodes of the second lattice at the default accuracy."""
 LEVELS: Final = (2, 3, 4, 6)
 """Nodes of the lattices in units of the box; the third and fourth only where the first two differ too much."""
 ORDER: Final = 2.0
 """Power of the spacing with which errors fall."""
-FEWEST_DIAMETERS: Final = 7.0
+FEWEST_DIAMETERS: Final = 8.0
 """Nodes per Sauter mean diameter of the second lattice, however wide the pores are."""
 
 

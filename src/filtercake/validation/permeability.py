@@ -22,7 +22,9 @@ from filtercake.api.steps import distribution
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.result import Packing, write_json
 from filtercake.packing.slab import interior_slab
-from filtercake.permeability.measure import ACCURACY, SPREAD, Permeability, measure_bed, measure_cell
+from filtercake.permeability.measure import SPREAD, measure_bed, measure_cell
+from filtercake.permeability.resolution import ACCURACY
+from filtercake.permeability.result import Permeability
 from filtercake.statistics import quantile
 from filtercake.units import MICROMETRE, FloatArray
 from filtercake.validation.hard_spheres import Species, arrange
