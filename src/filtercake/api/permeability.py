@@ -13,10 +13,13 @@ from pydantic import Field
 from filtercake.api.steps import ORIGIN, PLAIN_DENSITY, load_packing
 from filtercake.crystals.csd import mixture
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
+from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.own_spheres import OwnSpheres, check_spheres, read_spheres
 from filtercake.packing.result import SEAL, Packing, read_record
-from filtercake.permeability import measure
-from filtercake.permeability.measure import ACCURACY, COARSEST_ACCURACY, FINEST_ACCURACY, Report
+from filtercake.permeability.measure import Report, measure_bed, measure_cell
+from filtercake.permeability.replicates import constant_of
+from filtercake.permeability.resolution import ACCURACY, COARSEST_ACCURACY, FINEST_ACCURACY
+from filtercake.permeability.result import Level, Permeability
 from filtercake.study.config.values import TO_NUMBER, TO_WHOLE, Density, Model
 from filtercake.study.limits import unit_problems
 from filtercake.study.loading import parse
@@ -169,6 +172,22 @@ def permeabilities(
     return [_result(spheres, _solve(spheres, given, say), given.sphericity) for spheres in beds]
 
 
+def mean_kozeny_constant(found: Sequence[PackingPermeability]) -> KozenyConstant:
+    """Mean constant of packings of one kind, at least one, with its interval as that of a large one: as in studies."""
+    rows = [
+        {
+            "kozeny_constant": item.kozeny_constant,
+            "slab": item.slab_relative_ci95,
+            "numerical_ci95": item.permeability_ci95_m2 / item.permeability_m2,
+        }
+        for item in found
+    ]
+    mean = constant_of(rows)
+    if mean is None:
+        raise ValueError("a mean needs at least one packing")
+    return mean
+
+
 def _load(packing: Source, given: PermeabilityOptions) -> OwnSpheres:
     spheres = _read(packing)
     if given.density_kg_m3 is not None:
@@ -218,7 +237,7 @@ def _check_units(spheres: OwnSpheres) -> None:
         raise ConfigError(problems)
 
 
-def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> measure.Permeability:
+def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> Permeability:
     position, radius, box = spheres.position, spheres.radius, spheres.box
     how: dict[str, Any] = {
         "accuracy": given.accuracy,
@@ -227,13 +246,13 @@ def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> meas
     }
     try:
         if box is None:
-            return measure.measure_bed(position, radius, spheres.length, **how)
-        return measure.measure_cell(position, radius, box, **how)
+            return measure_bed(position, radius, spheres.length, **how)
+        return measure_cell(position, radius, box, **how)
     except FiltercakeError as error:
         raise PackingRejected([f"{spheres.origin}: {error}"]) from None
 
 
-def _result(spheres: OwnSpheres, found: measure.Permeability, sphericity: float) -> PackingPermeability:
+def _result(spheres: OwnSpheres, found: Permeability, sphericity: float) -> PackingPermeability:
     alpha = None if spheres.density is None else found.resistance(spheres.density) / sphericity**2
     numerical = found.numerical_ci95
     return PackingPermeability(
@@ -257,7 +276,7 @@ def _result(spheres: OwnSpheres, found: measure.Permeability, sphericity: float)
     )
 
 
-def _level(level: measure.Level) -> FlowLevel:
+def _level(level: Level) -> FlowLevel:
     return FlowLevel(
         nodes_across=int(level.across),
         nodes_per_sauter_mean=float(level.diameters_per_spacing),
