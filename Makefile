@@ -24,6 +24,9 @@ REPORTED := $(if $(STUDIES)$(JOINED),--config $(if $(STUDIES),studies=$(STUDIES)
 # a calibration where one is named, studies otherwise
 RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(CONFIG),calibrate --config calibrations=$(CALIBRATION))
 
+PERMEABILITY = $(BIN)/python -m filtercake.validation.permeability_page --folder results/benchmark/permeability \
+	--docs docs --template workflow/report/permeability.md.j2
+
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 # a misspelt variable would be ignored, and something else be run than was meant
@@ -42,7 +45,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
 $(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
-.PHONY: run report browser benchmark stability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin leaf-tests synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability permeability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin leaf-tests synthetic bed-size references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -118,11 +121,15 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 	$(if $(QUICK),,install -m 644 results/benchmark/images/stability_maps.png docs/images/)
 	$(if $(QUICK),,install -m 644 results/benchmark/stability.csv docs/data/)
 
-pages: setup ## redraw docs/benchmark.md and docs/stability.md from the tables in docs/data
+permeability: setup ## Stokes flow through packings, the evidence on the resistance law: docs/permeability.md (about 40 min on one core; goes on where it was stopped)
+	$(PERMEABILITY)
+
+pages: setup ## redraw docs/benchmark.md, docs/stability.md and docs/permeability.md from the tables in docs/data
 	$(SNAKEMAKE) redraw
 	install -m 644 results/benchmark_redrawn/*.md docs/
 	install -m 644 results/benchmark_redrawn/images/*.png docs/images/
 	install -m 644 results/benchmark_redrawn/*.csv docs/data/
+	$(PERMEABILITY) --redraw
 
 faults: setup ## hurt small sweeps in 200 ways (COUNT for another number) and resume them: docs/reliability.md (about 20 min; goes on where it was stopped)
 	@command -v faketime >/dev/null || apt-get install -y -qq --no-install-recommends faketime >/dev/null 2>&1 || \

@@ -7,7 +7,6 @@ rule permeability:
         "{results}/{study}/packings/{point}/replicates.json",
     output:
         "{results}/{study}/permeability/{point}/permeability.json",
-        "{results}/{study}/permeability/{point}/cut.npz",
     log:
         "{results}/{study}/logs/permeability/{point}.log",
     benchmark:

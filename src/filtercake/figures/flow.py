@@ -12,7 +12,7 @@ from filtercake.figures import selection, style
 from filtercake.figures.cross_section import plane_circles
 from filtercake.figures.selection import StudyData
 from filtercake.packing.result import Packing
-from filtercake.permeability.replicates import PICTURE, read_picture
+from filtercake.permeability.replicates import read_picture
 from filtercake.permeability.result import Picture
 from filtercake.units import MICROMETRE
 
@@ -32,7 +32,7 @@ def draw(data: StudyData) -> Figure:
         return figure
     name = str(point["point"])
     found, note = selection.packings(data, name, most=1)
-    picture = read_picture(data.packings.parent / "permeability" / name / PICTURE)
+    picture = read_picture(data.packings.parent / "permeability" / name)
     rows = data.summary[data.summary["point"] == name]
     if not found or picture is None:
         style.nothing(axes, "no accepted packing at the base material")

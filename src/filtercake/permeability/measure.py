@@ -36,7 +36,7 @@ from filtercake.units import FloatArray, IntArray, duration
 
 DOUBT: Final = 0.5
 """Share of the difference of the two finest lattices that is still in doubt."""
-REMAINDER: Final = 0.006
+REMAINDER: Final = 0.008
 """Relative half-width, on the second lattice by default, of what both lattices have in common."""
 ALIGNMENT: Final = 0.03
 """Relative half-width, on the second lattice by default, of what depends on where the nodes lie in one sphere."""
@@ -46,7 +46,7 @@ CHUNK: Final = 50
 """Steps between two looks."""
 LEAST_STEPS: Final = 150
 MOST_STEPS: Final = 6000
-SPREAD: Final = 0.35
+SPREAD: Final = 0.56
 """Relative standard deviation of the Kozeny constant of packings of one kind, times the root of their spheres."""
 
 Report = Callable[[str], None]

@@ -13,7 +13,7 @@ import numpy as np
 from filtercake.errors import PackingRejected
 from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.pack import MANIFEST, Outcome
-from filtercake.packing.result import Packing, publish, read_record, read_sealed, sealed, write_json
+from filtercake.packing.result import Packing, publish, read_record, read_sealed, sealed, sha256, write_json
 from filtercake.packing.scene import digest
 from filtercake.permeability.measure import bed_domain, solve
 from filtercake.permeability.result import Permeability, Picture
@@ -21,7 +21,7 @@ from filtercake.permeability.result import Permeability, Picture
 RECORD: Final = "permeability.json"
 """Name of the record of all solved packings of a point."""
 PICTURE: Final = "cut.npz"
-"""Name of the picture of the first one."""
+"""Name of the picture of the first one; its record holds the picture's checksum."""
 
 Report = Callable[[str], None]
 
@@ -65,14 +65,12 @@ def solve_replicates(
                 say=lambda line, who=outcome.replicate: note(f"r{who} {line}"),  # type: ignore[misc]
                 picture=picture is not None,
             )
-            if cut is not None:
-                _write_picture(folder / PICTURE, cut)
             row = {"key": key, "replicate": outcome.replicate, **row_of(found)}
+            if cut is not None:
+                row["picture"] = _write_picture(folder / PICTURE, cut)
             write_json(folder / f"r{outcome.replicate}.json", sealed(row))
             report(f"r{outcome.replicate}: k = {found.permeability:.4g} m2, {found.seconds:.1f} s")
         rows.append(row)
-    if not rows:
-        _write_picture(folder / PICTURE, Picture(np.empty((0, 0)), math.nan, math.nan))
     write_json(folder / RECORD, sealed({"packings": rows}))
 
 
@@ -81,11 +79,21 @@ def row_of(found: Permeability) -> dict[str, Any]:
     return {**asdict(found), "numerical_ci95": found.numerical_ci95}
 
 
-def read_picture(path: Path) -> Picture | None:
-    """Read the picture of a point; None where no packing was accepted."""
-    with np.load(path) as data:
-        speed = data["speed"]
-        return Picture(speed, float(data["spacing"]), float(data["bottom"])) if speed.size else None
+def read_picture(folder: Path) -> Picture | None:
+    """Read the picture of a point from its folder; None where no packing was accepted.
+
+    Raises
+    ------
+    PackingRejected
+        If the record or the picture is missing or damaged.
+    """
+    pictured = [row for row in read_sealed(folder / RECORD)["packings"] if "picture" in row]
+    if not pictured:
+        return None
+    if not _is_whole(folder / PICTURE, pictured[0]):
+        raise PackingRejected([f"{PICTURE} is not the picture that was made; remove {RECORD} to make it again"])
+    with np.load(folder / PICTURE) as data:
+        return Picture(data["speed"], float(data["spacing"]), float(data["bottom"]))
 
 
 def read_solved(path: Path) -> dict[int, dict[str, Any]]:
@@ -120,17 +128,22 @@ def _accepted(packings: Path, count: int) -> Iterable[Outcome]:
 
 def _kept(path: Path, key: str, picture: Path | None) -> dict[str, Any] | None:
     """Return what an earlier run found, if it is whole and of the same packing."""
-    if not path.is_file() or (picture is not None and not picture.is_file()):
-        return None
     try:
         row = read_sealed(path)
     except PackingRejected:
         return None
-    return row if row.get("key") == key else None
+    whole = picture is None or _is_whole(picture, row)
+    return row if whole and row.get("key") == key else None
 
 
-def _write_picture(path: Path, picture: Picture) -> None:
-    with publish(path) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(
-            stream, speed=picture.speed.astype(np.float32), spacing=picture.spacing, bottom=picture.bottom
-        )
+def _is_whole(picture: Path, row: Mapping[str, Any]) -> bool:
+    return picture.is_file() and sha256(picture) == row.get("picture")
+
+
+def _write_picture(path: Path, picture: Picture) -> str:
+    """Write a picture and return its checksum."""
+    with publish(path) as temporary:
+        with temporary.open("wb") as stream:
+            speed = picture.speed.astype(np.float32)
+            np.savez_compressed(stream, speed=speed, spacing=picture.spacing, bottom=picture.bottom)
+        return sha256(temporary)

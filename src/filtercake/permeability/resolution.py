@@ -19,7 +19,7 @@ LEVELS: Final = (2, 3, 4, 6)
 """Nodes of the lattices in units of the box; the third and fourth only where the first two differ too much."""
 ORDER: Final = 2.0
 """Power of the spacing with which errors fall."""
-FEWEST_DIAMETERS: Final = 6.0
+FEWEST_DIAMETERS: Final = 7.0
 """Nodes per Sauter mean diameter of the second lattice, however wide the pores are."""
 
 

@@ -10,9 +10,12 @@ from typing import Any
 import pandas as pd
 
 from filtercake.packing.engines.liggghts import Liggghts
+from filtercake.permeability.measure import SPREAD
 from filtercake.study import limits
 from filtercake.user_files import templates
+from filtercake.validation import resistance_law
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
+from filtercake.validation.permeability import BED, CELL, LATTICE, LAYERED, known_constant
 from filtercake.validation.stability import OUTCOMES, UNDECIDED, families, undetected, wrong
 
 INTERIOR, COUNT = "interior slab", "count"
@@ -140,6 +143,45 @@ def stability(template: Path, table: pd.DataFrame) -> str:
         undetected=_records(undetected(table)),
         drift=float(table.loc[table["n_accepted"] > 0, "momentum_drift"].max()),
         gain=float(table.loc[table["outcome"].isin(GOOD) & (table["fence"] == "allowed"), "energy_gain"].max()),
+    )
+
+
+def permeability(template: Path, table: pd.DataFrame, second: pd.DataFrame) -> str:
+    """Write the page on the resistance law from solved packings, one row each.
+
+    See :func:`filtercake.validation.permeability.solve_all`; ``second`` are the same packings by another method, empty
+    where there are none.
+    """
+    averages = resistance_law.by_case(table)
+    kinds = {kind: averages[averages["kind"] == kind] for kind in (BED, CELL, LAYERED, LATTICE)}
+    layers = resistance_law.layers_by_law(averages)
+    return _render(
+        template,
+        beds=_records(kinds[BED]),
+        one={row["case"]: row for row in _records(averages)},
+        cells=_records(kinds[CELL].assign(known=resistance_law.van_der_hoef(kinds[CELL]["porosity"].to_numpy()))),
+        layers=_records(layers),
+        layer_error=float((layers["slices"] / layers["constant"] - 1.0).abs().max()),
+        lattices=[{**row, "known": known_constant(row["label"], row["porosity"])} for row in _records(kinds[LATTICE])],
+        sets={
+            name: {
+                "free": resistance_law.fit(choose(averages)),
+                "cubic": resistance_law.fit(choose(averages), exponent=3.0),
+                "carman": resistance_law.overall(choose(averages), "constant"),
+                "eq3": resistance_law.overall(choose(averages), "eq3"),
+            }
+            for name, choose in resistance_law.SETS.items()
+        },
+        finer=_records(resistance_law.finer(table)),
+        narrow=int((kinds[BED]["ci95"] <= 0.03 * kinds[BED]["constant"]).sum()),
+        spread=resistance_law.spread(table),
+        spread_used=SPREAD,
+        paper=resistance_law.papers_mixture(float(kinds[BED].set_index("case")["constant"]["pmma_25_75"])),
+        msmpr=resistance_law.MSMPR_RATIO,
+        reference_porosity=resistance_law.REFERENCE_POROSITY,
+        total=len(table),
+        seconds=float(table["seconds"].sum()),
+        second=_records(second),
     )
 
 

@@ -66,7 +66,7 @@ def test_layers_in_series_resist_one_after_the_other() -> None:
     position = np.concatenate(
         [
             np.array([[0.5, 0.5, 0.5 + k] for k in range(4)]),
-            *[grid + [0.0, 0.0, 4.0 + k] for k in range(4)],
+            *(grid + np.array([0.0, 0.0, 4.0 + k]) for k in range(4)),
         ]
     )
     radius = np.concatenate([np.full(4, coarse), np.full(32, fine)])
