@@ -13,6 +13,7 @@ from filtercake.api.permeability import (
     FlowLevel,
     PackingPermeability,
     PermeabilityOptions,
+    mean_kozeny_constant,
     permeabilities,
     permeability,
 )
@@ -49,6 +50,7 @@ __all__ = [
     "filtration_test",
     "filtration_tests",
     "first_porosity",
+    "mean_kozeny_constant",
     "pack",
     "permeabilities",
     "permeability",

@@ -13,10 +13,11 @@ from pydantic import Field
 from filtercake.api.steps import ORIGIN, PLAIN_DENSITY, load_packing
 from filtercake.crystals.csd import mixture
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
+from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.own_spheres import OwnSpheres, check_spheres, read_spheres
 from filtercake.packing.result import SEAL, Packing, read_record
-from filtercake.permeability import measure
-from filtercake.permeability.measure import Report
+from filtercake.permeability.measure import Report, measure_bed, measure_cell
+from filtercake.permeability.replicates import constant_of
 from filtercake.permeability.resolution import ACCURACY, COARSEST_ACCURACY, FINEST_ACCURACY
 from filtercake.permeability.result import Level, Permeability
 from filtercake.study.config.values import TO_NUMBER, TO_WHOLE, Density, Model
@@ -171,6 +172,22 @@ def permeabilities(
     return [_result(spheres, _solve(spheres, given, say), given.sphericity) for spheres in beds]
 
 
+def mean_kozeny_constant(found: Sequence[PackingPermeability]) -> KozenyConstant:
+    """Mean constant of packings of one kind, at least one, with its interval as that of a large one: as in studies."""
+    rows = [
+        {
+            "kozeny_constant": item.kozeny_constant,
+            "slab": item.slab_relative_ci95,
+            "numerical_ci95": item.permeability_ci95_m2 / item.permeability_m2,
+        }
+        for item in found
+    ]
+    mean = constant_of(rows)
+    if mean is None:
+        raise ValueError("a mean needs at least one packing")
+    return mean
+
+
 def _load(packing: Source, given: PermeabilityOptions) -> OwnSpheres:
     spheres = _read(packing)
     if given.density_kg_m3 is not None:
@@ -229,8 +246,8 @@ def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> Perm
     }
     try:
         if box is None:
-            return measure.measure_bed(position, radius, spheres.length, **how)
-        return measure.measure_cell(position, radius, box, **how)
+            return measure_bed(position, radius, spheres.length, **how)
+        return measure_cell(position, radius, box, **how)
     except FiltercakeError as error:
         raise PackingRejected([f"{spheres.origin}: {error}"]) from None
 

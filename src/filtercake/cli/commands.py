@@ -378,15 +378,19 @@ def _run_porosity(options: argparse.Namespace) -> int:
 def _run_permeability(options: argparse.Namespace) -> int:
     asked = words.given(options, api.PermeabilityOptions.model_fields)
     found = api.permeabilities(options.packings, say=_say, **asked)
-    mean, half = _mean([item.kozeny_constant for item in found])
+    between = half_width(np.array([item.kozeny_constant for item in found]))
+    mean = api.mean_kozeny_constant(found)
+    half = mean.value * mean.relative_ci95
     if options.json:
         rows = [{"file": npz, **asdict(item)} for npz, item in zip(options.packings, found, strict=True)]
-        return _print_json({"packings": rows, "kozeny_constant": mean, "kozeny_constant_ci95": half})
+        constant = {"kozeny_constant": mean.value, "kozeny_constant_ci95": half}
+        return _print_json({"packings": rows, **constant, "kozeny_constant_between_packings_ci95": between})
     for npz, item in zip(options.packings, found, strict=True):
         print(f"{npz} ({item.particles} spheres)")
         _print_permeability(item)
     if len(found) > 1:
-        print(f"mean Kozeny constant of {len(found)}: {_number(mean)} +- {_number(half)} (95 %, between packings)")
+        alone = f"from the spread of these {len(found)} alone +- {_number(between)}"
+        print(f"mean Kozeny constant: {_number(mean.value)} +- {_number(half)} (95 %); {alone}")
     return 0
 
 

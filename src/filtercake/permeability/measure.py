@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 
 from filtercake.errors import FiltercakeError
+from filtercake.packing.contacts import find_contacts, lens_volume
 from filtercake.packing.slab import Slab, interior_slab, why_too_thin
 from filtercake.permeability.lattice import Lattice, Spheres, build
 from filtercake.permeability.resolution import (
@@ -32,7 +33,7 @@ from filtercake.permeability.resolution import (
 from filtercake.permeability.result import Level, Permeability, Picture
 from filtercake.permeability.stokes import Flow
 from filtercake.statistics import quantile
-from filtercake.units import FloatArray, IntArray, duration
+from filtercake.units import FloatArray, duration
 
 REMAINDER: Final = 0.008
 """Relative half-width, on the second lattice by default, of what both lattices have in common."""
@@ -52,12 +53,16 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Domain:
-    """Spheres in their box, and the slab of it that is measured; ``units`` of the box's side set the lattices."""
+    """Spheres in their box, and the slab of it that is measured.
+
+    ``units`` of the box's side set the lattices; ``counted_twice`` is the share of the spheres' volume in two of them.
+    """
 
     spheres: Spheres
     slab: Slab
     units: int
     periodic: bool
+    counted_twice: float = 0.0
 
 
 def measure_bed(
@@ -126,16 +131,21 @@ def bed_domain(position: FloatArray, radius: FloatArray, length: float, accuracy
     bottom, top = float((position[:, 2] - radius).min()), float((position[:, 2] + radius).max())
     layers = math.ceil((top - bottom) / unit) + 2 * FREE_UNITS
     box = np.array([length, length, layers * unit])
-    return Domain(Spheres(position, radius, box, bottom - FREE_UNITS * unit), slab, units, periodic=False)
+    return Domain(
+        Spheres(position, radius, box, bottom - FREE_UNITS * unit),
+        slab,
+        units,
+        False,
+        _counted_twice(position, radius, length),
+    )
 
 
 def cell_domain(position: FloatArray, radius: FloatArray, box: FloatArray, accuracy: float = ACCURACY) -> Domain:
     """Take a periodic cell as it is; parameters and errors as those of :func:`measure_cell`."""
-    volume = np.pi / 6.0 * (2.0 * radius) ** 3
-    sauter = float(volume.sum() / (volume / (2.0 * radius)).sum())
-    porosity = max(1.0 - float(volume.sum() / np.prod(box)), 0.05)
+    porosity, sauter = _whole(radius, float(np.prod(box)))
     units = _units(float(box[0]), porosity, sauter, accuracy)
-    return Domain(Spheres(position, radius, np.asarray(box)), Slab(0.0, float(box[2])), units, periodic=True)
+    twice = _counted_twice(position, radius, float(box[0])) if box[0] == box[1] else 0.0
+    return Domain(Spheres(position, radius, np.asarray(box)), Slab(0.0, float(box[2])), units, True, twice)
 
 
 def solve(
@@ -289,6 +299,20 @@ def _mean_pores(
     return max(1.0 - solid / area, 0.05), solid / over_diameter
 
 
+def _whole(radius: FloatArray, volume: float) -> tuple[float, float]:
+    """Porosity, overlaps counted twice, and Sauter mean diameter (m) of spheres in a volume (m3)."""
+    spheres = 4.0 / 3.0 * np.pi * radius**3
+    return max(1.0 - float(spheres.sum()) / volume, 0.05), float(spheres.sum() / np.sum(spheres / (2.0 * radius)))
+
+
+def _counted_twice(position: FloatArray, radius: FloatArray, length: float) -> float:
+    """Share of the spheres' volume that lies in two of them; contacts through the faces in z are not looked for."""
+    if radius.size < 2:
+        return 0.0
+    lenses = lens_volume(find_contacts(position, radius, length), radius)
+    return float(lenses.sum() / np.sum(4.0 / 3.0 * np.pi * radius**3))
+
+
 class _Slabs:
     """What the layers of a flow say of slabs of the bed."""
 
@@ -297,34 +321,31 @@ class _Slabs:
         self.heights = _heights(domain, flow.lattice)
         self.inside = np.flatnonzero((self.heights > domain.slab.lower) & (self.heights < domain.slab.upper))
 
-    def permeability(self, layers: IntArray | None = None) -> float:
-        """Return the permeability of some layers, of the whole slab by default, m2."""
+    def permeability(self) -> float:
+        """Return the permeability of the slab, m2."""
         speed = self.flow.layers()[1]
-        chosen = self.inside if layers is None else layers
-        if self.domain.periodic and layers is None:
+        if self.domain.periodic:
             gradient, velocity = 1.0, float(speed.mean())
         else:
-            x = chosen - chosen.mean()
-            gradient = float(np.sum(x * self.flow.potential()[chosen]) / np.sum(x * x))
-            velocity = float(np.sum(speed[chosen] * self._weights(chosen)))
+            x = self.inside - self.inside.mean()
+            gradient = float(np.sum(x * self.flow.potential()[self.inside]) / np.sum(x * x))
+            velocity = float(np.sum(speed[self.inside] * self._weights()))
         return velocity * self.flow.viscosity / gradient * self.flow.lattice.spacing**2
 
-    def means(self, layers: IntArray | None = None) -> tuple[float, float]:
+    def means(self) -> tuple[float, float]:
         """Return porosity and Sauter mean diameter (m), each layer weighted as in the slope of the pressure."""
-        chosen = self.inside if layers is None else layers
-        weights = self._weights(chosen)
-        _, ny, nx = self.flow.lattice.shape
-        porosity = float(np.sum(self.flow.lattice.fluid_per_layer()[chosen] / (ny * nx) * weights))
-        spheres, area = self.domain.spheres, float(self.domain.spheres.box[0] * self.domain.spheres.box[1])
-        sauter = _mean_pores(spheres.position, spheres.radius, area, self.heights[chosen], weights)[1]
-        return porosity, sauter
+        spheres, counted_twice = self.domain.spheres, self.domain.counted_twice
+        if self.domain.periodic:
+            porosity, sauter = _whole(spheres.radius, float(np.prod(spheres.box)))
+        else:
+            area, heights = float(spheres.box[0] * spheres.box[1]), self.heights[self.inside]
+            porosity, sauter = _mean_pores(spheres.position, spheres.radius, area, heights, self._weights())
+        return 1.0 - (1.0 - porosity) * (1.0 - counted_twice), sauter
 
-    def _weights(self, chosen: IntArray) -> FloatArray:
-        """Weights with which the slope of a line over these layers takes the gradient of each: a parabola."""
-        if self.domain.periodic and chosen.size == self.heights.size:
-            return np.full(chosen.size, 1.0 / chosen.size)
-        x = np.arange(chosen.size) + 0.5
-        weights = x * (chosen.size - x)
+    def _weights(self) -> FloatArray:
+        """Weights with which the slope of a line over the slab takes the gradient of each layer: a parabola."""
+        x = np.arange(self.inside.size) + 0.5
+        weights = x * (self.inside.size - x)
         return np.asarray(weights / weights.sum())
 
 

@@ -126,7 +126,8 @@ def test_text_and_json_say_what_the_api_says(packed: Path, capsys: Capture) -> N
         }
     constants = [item.kozeny_constant for item in called]
     assert found["kozeny_constant"] == pytest.approx(np.mean(constants))
-    assert found["kozeny_constant_ci95"] == pytest.approx(half_width(np.array(constants)))
+    assert found["kozeny_constant_between_packings_ci95"] == pytest.approx(half_width(np.array(constants)))
+    assert found["kozeny_constant_ci95"] < min(item.kozeny_constant_ci95 for item in called)
     text, progress = run([*files, *COARSE], capsys)
     assert progress.count("\n") == len(lines) == sum(len(item.levels) for item in called)
     assert all(line.startswith((files[0], files[1])) for line in lines)
@@ -141,16 +142,17 @@ def test_text_and_json_say_what_the_api_says(packed: Path, capsys: Capture) -> N
         half = half if half != key else f"{key}_ci95"
         row = found["packings"][0]
         assert line == (f"{row[key]:.4g}", f"{row[half]:.4g}")
-    last = text.splitlines()[-1]
-    shown = f"{found['kozeny_constant']:.4g} +- {found['kozeny_constant_ci95']:.4g}"
-    assert last == f"mean Kozeny constant of 2: {shown} (95 %, between packings)"
+    shown = f"{found['kozeny_constant']:.4g} +- {found['kozeny_constant_ci95']:.4g} (95 %)"
+    alone = f"from the spread of these 2 alone +- {found['kozeny_constant_between_packings_ci95']:.4g}"
+    assert text.splitlines()[-1] == f"mean Kozeny constant: {shown}; {alone}"
 
 
 def test_one_packing_has_no_interval_between_packings(tmp_path: Path, capsys: Capture) -> None:
     file = save(tmp_path / "cubic.npz", simple_cubic(0.343))
     found = as_json([file, *COARSE], capsys)
     assert found["kozeny_constant"] == found["packings"][0]["kozeny_constant"]
-    assert found["kozeny_constant_ci95"] is None
+    assert found["kozeny_constant_ci95"] == pytest.approx(found["packings"][0]["kozeny_constant_ci95"])
+    assert found["kozeny_constant_between_packings_ci95"] is None
     text, _ = run([file, *COARSE], capsys)
     assert "needs --density-kg-m3" in text and "mean Kozeny" not in text and "nan" not in text
 

@@ -175,7 +175,7 @@ def test_a_law_is_asked_for_as_it_must_be(more: list[str], said: str, capsys: Ca
 
 def test_packings_know_no_flow(capsys: Capture, tmp_path: Path) -> None:
     words = ["pack", *BED, "--law", "stokes", "--output", str(tmp_path / "bed")]
-    assert "--law = stokes: needs the flow solved in the study's packings" in complaint(words, capsys)
+    assert "--law = stokes: needs the flow solved in the packings" in complaint(words, capsys)
 
 
 def test_a_law_decides_nothing_of_the_packings(packed: Path, capsys: Capture) -> None:
