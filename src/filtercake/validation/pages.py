@@ -181,7 +181,7 @@ def permeability(template: Path, table: pd.DataFrame, second: pd.DataFrame) -> s
         reference_porosity=resistance_law.REFERENCE_POROSITY,
         total=len(table),
         seconds=float(table["seconds"].sum()),
-        second=_records(second),
+        second=[] if second.empty else _records(resistance_law.both_methods(table, second)),
     )
 
 

@@ -28,14 +28,28 @@ from filtercake.permeability.result import Permeability
 from filtercake.statistics import quantile
 from filtercake.units import MICROMETRE, FloatArray
 from filtercake.validation.hard_spheres import Species, arrange
+from filtercake.validation.stokes_reference import BEDS
 
-BED, CELL, LAYERED, LATTICE, FINER = "bed", "hard spheres", "layers", "lattice", "finer"
+BED, CELL, LAYERED, LATTICE, FINER, SECOND = "bed", "hard spheres", "layers", "lattice", "finer", "second"
 """Kinds of cases; of layers and lattices no law of mixed packings is asked, and finer are beds solved once more."""
 MIXED = (BED, CELL)
 DIAMETER: Final = 20.0 * MICROMETRE
 """Of the (finer) spheres of a cell, m."""
 FINER_ENDING: Final = "_finer"
-FINER_ACCURACY: Final = 0.007
+TWICE: Final = (
+    "one_size",
+    "one_size_free",
+    "one_size_rough",
+    "pmma_75_25",
+    "pmma_50_50",
+    "pmma_25_75",
+    "pmma_free",
+    "pmma_friction_0.05",
+    "pmma_friction_0.3",
+    "binary_2",
+)
+"""Cases of which beds are solved on fine lattices as well."""
+FINER_ACCURACY: Final = 0.005
 CELL_SPHERES: Final = 250
 SEED: Final = 20_26
 SLICES: Final = 400
@@ -101,15 +115,26 @@ def cases() -> list[Case]:
     """List all cases: what is cheap first, so that a table soon has something of everything."""
     beds = [*_one_size(), *_pmma()]
     wide = _wide()
-    return [*beds, *_hard_spheres(), *_lattices(), *wide, *_layers(), *_finer([*beds, *wide])]
+    return [*beds, *_hard_spheres(), *_lattices(), *wide, *_layers(), *_second(), *_finer([*beds, *wide])]
 
 
 def _finer(beds: Iterable[Case]) -> list[Case]:
-    """Solve the first bed of some cases with a smaller numerical error, to show that it is as small as is said."""
+    """Solve two beds of ten cases on fine lattices, to show whether the stated error covers."""
     return [
-        replace(case, name=f"{case.name}{FINER_ENDING}", kind=FINER, replicates=1, accuracy=FINER_ACCURACY)
+        replace(case, name=f"{case.name}{FINER_ENDING}", kind=FINER, replicates=2, accuracy=FINER_ACCURACY)
         for case in beds
-        if case.name in ("one_size", "pmma_50_50", "pmma_friction_0.3")
+        if case.name in TWICE
+    ]
+
+
+def _second() -> list[Case]:
+    """List the beds that the second method is run on."""
+    return [
+        replace(
+            _bed(name, name, mixture), name=f"second_{number}", kind=SECOND, replicates=1, accuracy=0.01, options=own
+        )
+        for number, (name, (mixture, options)) in enumerate(BEDS.items())
+        for own in [{"friction": 0, **options}]
     ]
 
 

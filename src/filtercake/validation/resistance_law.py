@@ -19,7 +19,7 @@ from filtercake.crystals.csd import mixture
 from filtercake.filtration.resistance import KOZENY_CARMAN, carman_sauter, kozeny_carman
 from filtercake.statistics import Spread, quantile
 from filtercake.units import MICROMETRE, FloatArray
-from filtercake.validation.permeability import BED, CELL, FINER, FINER_ENDING, LATTICE, LAYERED, MIXED
+from filtercake.validation.permeability import BED, CELL, FINER, FINER_ENDING, LATTICE, LAYERED, MIXED, SECOND
 
 CARMAN: Final = KOZENY_CARMAN
 """Constant that the paper has in its eq. 3: P. C. Carman, Trans. Inst. Chem. Eng. 15 (1937) 150."""
@@ -261,28 +261,60 @@ def layers_by_law(cases: pd.DataFrame) -> pd.DataFrame:
 
 
 def finer(table: pd.DataFrame) -> pd.DataFrame:
-    """Hold beds solved with a smaller numerical error against the same beds as they are in the averages.
+    """Hold beds solved on fine lattices against the same beds as they are in the averages.
 
     Returns
     -------
     DataFrame
-        label, constant and numerical_ci95 (relative) as in the averages, finer and finer_ci95 with the smaller error,
-        and change, the relative difference.
+        case, replicate, label, nodes (per mean diameter, on the finest lattice), constant and numerical_ci95 (relative)
+        as in the averages; finer_nodes, finer and finer_ci95 on the fine lattices; change, the relative difference; and
+        whether the stated error covers it.
     """
-    listed = table.assign(numerical=np.hypot(table["resolution"], table["convergence"]))
-    again = listed[listed["kind"] == FINER].set_index("case")
-    again.index = again.index.str.removesuffix(FINER_ENDING)
-    before = listed[(listed["kind"] == BED) & (listed["replicate"] == 0)].set_index("case").loc[again.index]
+    listed = table.assign(
+        numerical=np.hypot(table["resolution"], table["convergence"]),
+        nodes=table["diameters_per_spacing"].astype(str).str.split().str[-1].astype(float),
+        case=table["case"].str.removesuffix(FINER_ENDING),
+    )
+    keys = ["case", "replicate"]
+    columns = [*keys, "label", "nodes", "kozeny_constant", "numerical"]
+    before, again = (listed.loc[listed["kind"] == kind, columns] for kind in (BED, FINER))
+    found = before.merge(again.drop(columns="label"), on=keys, suffixes=("", "_finer"))
+    found["change"] = found["kozeny_constant_finer"] / found["kozeny_constant"] - 1.0
+    found["covered"] = found["change"].abs() <= found["numerical"]
+    return found.rename(
+        columns={
+            "kozeny_constant": "constant",
+            "numerical": "numerical_ci95",
+            "nodes_finer": "finer_nodes",
+            "kozeny_constant_finer": "finer",
+            "numerical_finer": "finer_ci95",
+        }
+    )
+
+
+def both_methods(table: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
+    """Put the beds of the second method (columns of its table) beside what this one finds of them.
+
+    Returns
+    -------
+    DataFrame
+        bed, porosity and constant with numerical_ci95 (relative) of this method; other_porosity, other and other_ci95 of
+        the second one; and difference, relative.
+    """
+    ours = table[table["kind"] == SECOND]
+    found = ours.merge(other, left_on="label", right_on="bed", suffixes=("", "_other"))
     return pd.DataFrame(
         {
-            "label": again["label"],
-            "constant": before["kozeny_constant"],
-            "numerical_ci95": before["numerical"],
-            "finer": again["kozeny_constant"],
-            "finer_ci95": again["numerical"],
-            "change": again["kozeny_constant"] / before["kozeny_constant"] - 1.0,
+            "bed": found["bed"],
+            "porosity": found["porosity"],
+            "constant": found["kozeny_constant"],
+            "numerical_ci95": np.hypot(found["resolution"], found["convergence"]),
+            "other_porosity": found["porosity_other"],
+            "other": found["kozeny_constant_other"],
+            "other_ci95": found["relative_error"],
+            "difference": found["kozeny_constant"] / found["kozeny_constant_other"] - 1.0,
         }
-    ).reset_index(drop=True)
+    )
 
 
 def papers_mixture(constant: float) -> dict[str, float]:
