@@ -45,7 +45,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
 $(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
-.PHONY: run report browser benchmark stability permeability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin leaf-tests synthetic bed-size references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability permeability pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin leaf-tests synthetic bed-size flow-speed references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -123,6 +123,9 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 
 permeability: setup ## Stokes flow through packings, the evidence on the resistance law: docs/permeability.md (about 40 min on one core; goes on where it was stopped)
 	$(PERMEABILITY)
+
+flow-speed: setup ## time the solver of the flow against copying memory: docs/data/permeability_speed.csv (about 3 min, alone on the machine)
+	$(BIN)/python -m filtercake.validation.flow_speed --output docs/data/permeability_speed.csv
 
 pages: setup ## redraw docs/benchmark.md, docs/stability.md and docs/permeability.md from the tables in docs/data
 	$(SNAKEMAKE) redraw

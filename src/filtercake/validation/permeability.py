@@ -129,13 +129,11 @@ def _finer(beds: Iterable[Case]) -> list[Case]:
 
 def _second() -> list[Case]:
     """List the beds that the second method is run on."""
-    return [
-        replace(
-            _bed(name, name, mixture), name=f"second_{number}", kind=SECOND, replicates=1, accuracy=0.01, options=own
-        )
-        for number, (name, (mixture, options)) in enumerate(BEDS.items())
-        for own in [{"friction": 0, **options}]
-    ]
+    found = []
+    for number, (label, (mixture, options)) in enumerate(BEDS.items()):
+        case = Case(f"second_{number}", SECOND, label, distribution={"mixture": mixture})
+        found.append(replace(case, options={"friction": 0, **options}, replicates=1, accuracy=0.01))
+    return found
 
 
 def _bed(name: str, label: str, mixture: Mapping[float, float], particles: int = 2000, **options: Any) -> Case:

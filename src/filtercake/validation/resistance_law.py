@@ -298,8 +298,8 @@ def both_methods(table: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        bed, porosity and constant with numerical_ci95 (relative) of this method; other_porosity, other and other_ci95 of
-        the second one; and difference, relative.
+        bed, porosity and constant with numerical_ci95 (relative) of this method; other_porosity, other and other_ci95
+        of the second one; and difference, relative.
     """
     ours = table[table["kind"] == SECOND]
     found = ours.merge(other, left_on="label", right_on="bed", suffixes=("", "_other"))

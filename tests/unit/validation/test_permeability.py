@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from filtercake.api.steps import distribution
-from filtercake.permeability.measure import Permeability
+from filtercake.permeability.result import Permeability
 from filtercake.validation import permeability
 from filtercake.validation.hard_spheres import Species, arrange, deepest_overlap
 from filtercake.validation.permeability import (
@@ -21,6 +21,7 @@ from filtercake.validation.permeability import (
     LAYER_SOLIDS,
     LAYERED,
     MIXED,
+    SECOND,
     cases,
     layered,
 )
@@ -40,7 +41,7 @@ def table() -> pd.DataFrame:
 def test_the_cases_are_well_formed() -> None:
     listed = cases()
     assert len({case.name for case in listed}) == len(listed)
-    assert all((case.cell is None) == bool(case.distribution) == (case.kind in (BED, FINER)) for case in listed)
+    assert all((case.cell is None) == bool(case.distribution) == (case.kind in (BED, FINER, SECOND)) for case in listed)
     assert all(case.replicates >= 3 for case in listed if case.kind == BED)
     assert all(case.replicates >= 2 for case in listed if case.kind in (*MIXED, LAYERED))
     assert sum(case.kind == BED for case in listed) >= 8
