@@ -38,3 +38,18 @@ def test_an_answer_is_what_its_command_prints(
     for (words, values), (_, expected) in zip(found, shown, strict=True):
         if not words.startswith("packings "):
             assert values == pytest.approx(expected, rel=tolerance), words
+
+
+def test_the_flow_is_what_its_command_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for number in (0, 2):
+        (command,) = commands_of(SHELL[number])
+        capsys.readouterr()
+        assert main(command.words[1:]) == 0
+    shown = printed(SHOWN[2])
+    found = printed(capsys.readouterr().out)[: len(shown)]
+    assert [words for words, _ in found] == [words for words, _ in shown]
+    for (words, values), (_, expected) in zip(found, shown, strict=True):
+        assert values == pytest.approx(expected, rel=0.08), words
