@@ -22,7 +22,8 @@ from filtercake.api.steps import distribution
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.result import Packing, write_json
 from filtercake.packing.slab import interior_slab
-from filtercake.permeability.measure import SPREAD, measure_bed, measure_cell
+from filtercake.permeability.measure import SPREAD, bed_domain, measure_cell
+from filtercake.permeability.measure import solve as solve_flow
 from filtercake.permeability.resolution import ACCURACY
 from filtercake.permeability.result import Permeability
 from filtercake.statistics import quantile
@@ -363,7 +364,9 @@ def _solved_bed(case: Case, replicate: int, folder: Path) -> Solved:
     if not bed.files:
         raise ValueError(f"{case.name}: {'; '.join(bed.failures)}")
     packing = Packing.load(bed.files[0])
-    found = measure_bed(packing.position, packing.radius, packing.length, accuracy=case.accuracy)
+    domain = bed_domain(packing.position, packing.radius, packing.length, case.accuracy)
+    # a fine lattice is its own end: no third one is taken where two of them differ
+    found, _ = solve_flow(domain, ACCURACY if case.kind == FINER else case.accuracy)
     slab = interior_slab(packing.position, packing.radius)
     ratio = width_ratio(packing.position, packing.radius, (slab.lower, slab.upper))
     return Solved(found, 1 + replicate, packing.radius.size, ratio)
