@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 from filtercake.crystals.csd import FullAndTruncated
@@ -76,7 +77,7 @@ def resistance_columns(
         LAW: law,
         "resistance_m_kg": chosen,
         **{f"resistance_{name}_m_kg": resistance(name, porosity, full, *material) for name in ALWAYS},
-        f"resistance_{STOKES}_m_kg": None
+        f"resistance_{STOKES}_m_kg": math.nan
         if kozeny is None
         else resistance(STOKES, porosity, full, *material, constant),
         "resistance_sauter_m_kg": carman_sauter(porosity, full, *material),

@@ -23,7 +23,7 @@ from filtercake.results.paper_tables import (
     table2,
     table4,
 )
-from filtercake.results.replicates import summarise
+from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
 from filtercake.results.resistance_columns import LAW, resistance_columns
 from filtercake.study.loading import LoadedStudy, load_study
 from filtercake.study.points import expand
@@ -127,7 +127,7 @@ def designed(alum_study: LoadedStudy, law: str) -> pd.DataFrame:
             columns = resistance_columns(law, porosity, csds(alum_study)[point.csd], 2450.0, 1.0)
             scaled = {name: value * (1 + 0.01 * sign) if name != LAW else value for name, value in columns.items()}
             rows.append({**row, **scaled})
-    replicates = pd.DataFrame(rows)
+    replicates = pd.DataFrame(rows).reindex(columns=list(REPLICATE_COLUMNS))
     for column in ("soft_contact_compaction", "pull_off_over_weight", "overlap_max", "wall_s"):
         replicates[column] = 1.0
     model = alum_study.model.model_copy(update={"resistance_law": law})
@@ -179,7 +179,7 @@ def test_table_4_by_the_paper_s_own_porosities(pmma_study: LoadedStudy) -> None:
             porosity = 0.6
         row = {**point.row(), "status": "ok", "porosity": porosity - 0.01, "porosity_paper_count": porosity}
         rows.append({**row, **resistance_columns("carman", porosity - 0.01, csds(pmma_study)[point.csd], 1180.0, 1.0)})
-    replicates = pd.DataFrame(rows)
+    replicates = pd.DataFrame(rows).reindex(columns=list(REPLICATE_COLUMNS))
     for column in (
         "soft_contact_compaction",
         "pull_off_over_weight",

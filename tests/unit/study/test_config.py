@@ -836,7 +836,8 @@ def test_a_study_has_a_law_of_the_resistance(law: str, study_from: Callable[...,
         ("180", "must be a valid string"),
         (
             "stokes",
-            "needs the flow solved in the study's packings, which a study cannot ask for; allowed: additive, carman",
+            "needs the flow solved in the packings: use additive or carman, or give a study the section permeability "
+            "(permeability: {packings: 2})",
         ),
     ],
 )
@@ -887,3 +888,14 @@ def test_a_key_of_an_earlier_version_is_refused_with_its_new_name(
         study_from(f"{good_study}{block}\n")
     problem = next(problem for problem in caught.value.problems if problem.key == key)
     assert problem.allowed == f"is now called {new}"
+
+
+def test_the_flow_solved_in_packings_gives_the_law_stokes_its_constant(
+    study_from: Callable[..., LoadedStudy], good_study: str
+) -> None:
+    found = study_from(good_study + "resistance_law: stokes\npermeability: {packings: 1}\n")
+    assert found.model.permeability is not None and found.model.permeability.accuracy == 0.02
+    with pytest.raises(ConfigError, match=r"permeability.accuracy = 0.5: must be less than or equal to 0.2"):
+        study_from(good_study + "permeability: {accuracy: 0.5}\n")
+    with pytest.raises(ConfigError, match=r"permeability.packings = 0: must be greater than or equal to 1"):
+        study_from(good_study + "permeability: {packings: 0}\n")
