@@ -375,8 +375,8 @@ def _law_problems(model: Study, file: str) -> Iterable[Problem]:
     if law_of(model.resistance_law).needs_kozeny_constant and model.permeability is None:
         usable = [law.name for law in RESISTANCE_LAWS.values() if not law.needs_kozeny_constant]
         allowed = (
-            f"needs the flow solved in the packings: use {' or '.join(usable)}, or give a study the section permeability "
-            "(permeability: {packings: 2})"
+            f"needs the flow solved in the packings: use {' or '.join(usable)}, or give a study the section "
+            "permeability (permeability: {packings: 2})"
         )
         yield Problem(file, "resistance_law", repr(model.resistance_law), allowed)
 
