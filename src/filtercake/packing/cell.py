@@ -36,8 +36,11 @@ BALANCED: Final = 1e-5
 """Such a ratio that need not fall any more."""
 POROSITY_TOLERANCE: Final = 2e-5
 """Change of porosity within the window."""
-ANISOTROPY_LIMIT: Final = 3.0
-"""Largest deviation of the stress from an isotropic one, over the stress, times the root of the number of spheres."""
+ANISOTROPY_LIMIT: Final = 6.0
+"""Largest deviation of the stress from an isotropic one, over the stress, times the root of the number of spheres.
+
+The largest of 26 cells with friction 0.3 had 3.2, of cells without friction 1.7.
+"""
 FRICTIONLESS_STEP, FRICTIONAL_STEP = 0.5, 0.2
 """Time step over Rayleigh's."""
 
@@ -68,7 +71,8 @@ class CellScene:
         Drag over mass, in units of ``sqrt(p/rho)/D`` with the Sauter mean D: 1 to 2. Without it cells with friction
         depend on how they were made.
     servo : float
-        Fastest rate at which the box's volume changes, in the same unit: up to 3e-2 with drag, 1e-2 without.
+        Fastest rate at which the box's volume changes, in the same unit. Three times the default halves the steps
+        and packs friction 0.3 denser by 0.003.
     time_step_rayleigh : float
         Time step over Rayleigh's of the smallest sphere; 0 chooses by friction.
     mass_scaling : bool
@@ -89,7 +93,7 @@ class CellScene:
     seed: int = 1
     void_fraction: float = 0.65
     drag: float = 2.0
-    servo: float = 3e-2
+    servo: float = 1e-2
     time_step_rayleigh: float = 0.0
     mass_scaling: bool = False
     patience: int = 150_000
