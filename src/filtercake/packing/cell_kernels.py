@@ -1,8 +1,8 @@
 """Compiled kernels of the pressure cell: periodic images, the servo on the box, and the averages that judge rest.
 
 All in SI. Contacts are the embedded engine's, and so are the half steps of the velocity. Here a velocity is that
-relative to the box, which shrinks or grows about its middle at ``rate`` (1/s): the state that the contacts see holds
-``v + rate (x - L/2)``. A sphere with contacts across a face of the box appears again as an image, a row behind the
+relative to the box, which shrinks or grows about its corner at ``rate`` (1/s): the state that the contacts see holds
+``v + rate x``. A sphere with contacts across a face of the box appears again as an image, a row behind the
 spheres, whose forces are the sphere's own.
 """
 
@@ -102,7 +102,7 @@ def place_images(bodies: kernels.Bodies, motion: Motion, frictional: bool) -> No
     n = velocity.shape[0]
     for i in range(n):
         for k in range(3):
-            state[i, U + k] = velocity[i, k] + rate * (state[i, X + k] - 0.5 * length)
+            state[i, U + k] = velocity[i, k] + rate * state[i, X + k]
     for g in range(motion.owner.size):
         i = motion.owner[g]
         for k in range(3):
@@ -152,7 +152,7 @@ def move(bodies: kernels.Bodies, motion: Motion, time_step: float, frictional: b
     """Kick and move the spheres and the box by one step; return the largest speed in the box, m/s."""
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     velocity, box = motion.velocity, motion.box
-    rate, middle = box[1], 0.5 * box[0]
+    rate = box[1]
     fastest = 0.0
     for i in range(velocity.shape[0]):
         half = 0.5 * motion.drag[i] * time_step
@@ -162,7 +162,7 @@ def move(bodies: kernels.Bodies, motion: Motion, time_step: float, frictional: b
             v = keep * velocity[i, k] + kick * force[i, k]
             velocity[i, k] = v
             square += v * v
-            state[i, X + k] += time_step * (v + rate * (state[i, X + k] - middle))
+            state[i, X + k] += time_step * (v + rate * state[i, X + k])
         fastest = max(fastest, square)
         if frictional:
             turn = kick / (0.4 * state[i, RADIUS] * state[i, RADIUS])
@@ -180,7 +180,7 @@ def _room_left(state: FloatArray, length: float, reach: Reach) -> float:
     for i in range(reach.reference.shape[0]):
         square = 0.0
         for k in range(3):
-            moved = state[i, X + k] - 0.5 * length - scale * (reach.reference[i, k] - 0.5 * reach.length)
+            moved = state[i, X + k] - scale * reach.reference[i, k]
             square += moved * moved
         farthest = max(farthest, square)
     return scale * reach.skin - max(1.0 - scale, 0.0) * reach.widest - 2.0 * math.sqrt(farthest)

@@ -95,7 +95,7 @@ def test_two_sticky_spheres_balance_and_pull_off_as_the_closed_forms_say() -> No
 
     pull_off = contact_law.pull_off_force(cohesion, E, NU, 15 * UM, 10 * UM)
     assert abs(force(balance)) < 0.01 * pull_off
-    assert force(balance * 4.0 / 9.0) == pytest.approx(-2.0 / 9.0 * pull_off * 1.5**3 / 1.5 / 0.75 / 2.0, rel=0.5)
+    assert force(4.0 / 9.0 * balance) == pytest.approx(-pull_off, rel=2e-3)
     assert min(force(share * balance) for share in np.linspace(0.3, 0.6, 31)) == pytest.approx(-pull_off, rel=2e-3)
 
 
@@ -113,12 +113,45 @@ def test_two_spheres_rebound_with_their_restitution(at: np.ndarray) -> None:
     assert box.momentum() == pytest.approx(momentum, rel=1e-9, abs=1e-22)
 
 
+def rubbed(at: np.ndarray) -> tuple[CellBox, np.ndarray, np.ndarray]:
+    """Two spheres that meet at a slant, after their contact has opened; velocities and spins in their order."""
+    box = two(-0.01 * UM, np.array([1.0, 0.0, 0.0]), at, friction=0.3, drag=0.0, restitution=0.9)
+    first, second = np.argsort(box.identity)
+    box.velocity[first], box.velocity[second] = (0.02, 0.015, 0.0), (-0.02, 0.0, 0.01)
+    for _ in range(10):
+        box.advance(60)
+        box._list_pairs()  # springs must survive it
+    back = np.argsort(box.identity)
+    return box, box.velocity[back], box.spin[back]
+
+
+def test_friction_turns_two_spheres_and_keeps_their_angular_momentum() -> None:
+    box, velocity, spin = rubbed(MIDDLE)
+    place, mass, radius = box.positions(), box.spheres[np.argsort(box.identity), 7], box.scene.radius
+    before = np.array([[0.02, 0.015, 0.0], [-0.02, 0.0, 0.01]])
+    start = np.array([MIDDLE, MIDDLE + np.array([25.01 * UM, 0.0, 0.0])])
+    wanted = np.cross(start, mass[:, None] * before).sum(axis=0)
+    found = np.cross(place, mass[:, None] * velocity).sum(axis=0) + 0.4 * (mass * radius**2) @ spin
+    about = mass.sum() * 25 * UM * 0.02
+    # the box shrinks a little meanwhile
+    assert found == pytest.approx(wanted, abs=2e-3 * about)
+    assert np.abs(spin).min(axis=0)[1:].min() > 10.0 and box.look().coordination == 0.0
+
+
+@pytest.mark.parametrize("at", PLACES[1:], ids=["corner", "edge", "beyond"])
+def test_friction_is_the_same_across_a_face(at: np.ndarray) -> None:
+    _, velocity, spin = rubbed(MIDDLE)
+    _, other_velocity, other_spin = rubbed(at)
+    assert other_velocity == pytest.approx(velocity, abs=1e-9)
+    assert other_spin == pytest.approx(spin, abs=1e-9 * np.abs(spin).max())
+
+
 def test_drag_stops_a_sphere_as_an_exponential() -> None:
     box = two(-60 * UM, np.array([1.0, 0.0, 0.0]), MIDDLE, drag=2.0)
     box.velocity[:] = 1e-3
     box.advance(200)
     lasted = 200 * box.scene.time_step
-    assert box.velocity == pytest.approx(1e-3 * math.exp(-2.0 * box.scene.rate * lasted), rel=1e-6)
+    assert box.velocity == pytest.approx(1e-3 * math.exp(-2.0 * box.scene.rate * lasted), rel=1e-4)
 
 
 def test_a_box_without_contacts_shrinks_at_the_servos_rate_and_carries_its_spheres_along() -> None:
@@ -131,7 +164,7 @@ def test_a_box_without_contacts_shrinks_at_the_servos_rate_and_carries_its_spher
 
 
 @pytest.mark.parametrize(
-    ("sizes", "friction"), [(ONE_SIZE, 0.0), (HALVES, 0.3), (((10, 20, 40, 60), (0.15, 0.25, 0.3, 0.3)), 0.0)]
+    ("sizes", "friction"), [(ONE_SIZE, 0.0), (HALVES, 0.3), (((10, 20, 40), (0.15, 0.25, 0.6)), 0.0)]
 )
 def test_every_contact_is_listed_while_the_box_deforms_and_no_momentum_arises(sizes: Sizes, friction: float) -> None:
     scene = scene_of(sizes, 300, friction=friction, cohesion=15e3, drag=0.5, servo=0.05)
@@ -163,9 +196,10 @@ def test_looking_changes_nothing() -> None:
 
 
 def test_one_size_without_friction_is_random_close_packed() -> None:
-    found = [pressed(particles=500, seed=seed) for seed in (1, 2, 3)]
+    found = [pressed(particles=500, seed=seed) for seed in range(1, 6)]
     assert all(cell.accepted for cell in found), found
-    assert np.mean([cell.last.rigid_porosity for cell in found]) == pytest.approx(0.360, abs=0.005)
+    # 0.36, and 0.003 to 0.004 more in a cell of 500; sixteen have 0.3645, standard deviation 0.0023
+    assert np.mean([cell.last.rigid_porosity for cell in found]) == pytest.approx(0.3625, abs=0.005)
     assert np.mean([cell.last.coordination for cell in found]) == pytest.approx(6.2, abs=0.3)
     for cell in found:
         assert cell.last.pressure == pytest.approx(88.0, rel=3e-3)
@@ -209,7 +243,7 @@ def test_the_seed_decides_the_cell() -> None:
 def test_a_stress_that_is_not_reached_is_refused() -> None:
     found = press(scene_of(particles=100, patience=1200))
     assert not found.accepted and found.steps == 1200
-    assert "stress 0 Pa after 1,200 steps: must be within 0.003 of 88 Pa" in found.reasons
+    assert any("Pa after 1,200 steps: must be within 0.003 of 88 Pa" in text for text in found.reasons)
     assert any(text.startswith("porosity changed by") for text in found.reasons)
 
 
@@ -332,7 +366,10 @@ def test_adhesion_is_the_pull_off_of_jkr() -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"pressure": 53e3, "youngs_modulus": 0.1e9}, "stress = 5.3e+04 Pa, 0.001 of E* = 5.208e+07 Pa: must be at most"),
+        (
+            {"pressure": 53e3, "youngs_modulus": 0.1e9},
+            "stress = 5.3e+04 Pa, 0.001 of E* = 5.208e+07 Pa: must be at most",
+        ),
         ({"pressure": 53e3, "youngs_modulus": 3e9, "strength": 2e4}, "strength = 2e+04 Pa, 1.3e-05 of E*"),
         ({"pressure": -1.0, "youngs_modulus": 3e9}, "pressure = -1 Pa: must be a finite number above 0"),
         ({"pressure": 1e4, "youngs_modulus": math.nan}, "youngs_modulus = nan Pa"),
