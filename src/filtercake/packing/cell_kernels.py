@@ -173,7 +173,7 @@ def move(bodies: kernels.Bodies, motion: Motion, time_step: float, frictional: b
 
 
 @_compiled
-def _room_left(state: FloatArray, length: float, reach: Reach) -> float:
+def room_left(state: FloatArray, length: float, reach: Reach) -> float:
     """Way, m, by which no pair that is not listed has come too near, from how spheres have moved in the box."""
     scale = length / reach.length
     farthest = 0.0
@@ -216,7 +216,7 @@ def make_advance(cohesive: bool, frictional: bool) -> Callable[..., tuple[int, b
             speed = move(bodies, motion, time_step, frictional)
             room -= time_step * (2.0 * speed + abs(box[1]) * (reach.widest + reach.skin))
             if not room > 0.0:
-                room = _room_left(bodies.state, box[0], reach)
+                room = room_left(bodies.state, box[0], reach)
                 if not room > LEAST_ROOM * reach.skin:
                     return done + 1, True
         return steps, False

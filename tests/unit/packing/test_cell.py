@@ -27,6 +27,7 @@ from filtercake.packing.cell import (
     unrest,
 )
 from filtercake.packing.cell_box import CellBox
+from filtercake.packing.cell_kernels import Reach, room_left
 from filtercake.packing.cloud import place_spheres
 from filtercake.packing.similarity import LARGEST_LOAD, LARGEST_STRENGTH, check_rigid, similar, strength_of_adhesion
 
@@ -147,11 +148,12 @@ def test_friction_is_the_same_across_a_face(at: np.ndarray) -> None:
 
 
 def test_drag_stops_a_sphere_as_an_exponential() -> None:
-    box = two(-60 * UM, np.array([1.0, 0.0, 0.0]), MIDDLE, drag=2.0)
-    box.velocity[:] = 1e-3
+    box = two(-60 * UM, np.array([1.0, 0.0, 0.0]), MIDDLE, drag=2.0, friction=0.3)
+    box.velocity[:], box.bodies.spin[:] = 1e-3, 7.0
     box.advance(200)
     lasted = 200 * box.scene.time_step
     assert box.velocity == pytest.approx(1e-3 * math.exp(-2.0 * box.scene.rate * lasted), rel=1e-4)
+    assert box.spin == pytest.approx(7e3 * box.velocity, rel=1e-9)
 
 
 def test_a_box_without_contacts_shrinks_at_the_servos_rate_and_carries_its_spheres_along() -> None:
@@ -161,6 +163,17 @@ def test_a_box_without_contacts_shrinks_at_the_servos_rate_and_carries_its_spher
     rate = 0.03 * box.scene.rate / 3.0
     assert box.length == pytest.approx(side * math.exp(-rate * 300 * box.scene.time_step), rel=1e-5)
     assert box.positions() / box.length == pytest.approx(places, abs=1e-12)
+
+
+def test_the_room_of_a_pair_list_shrinks_with_the_box_and_with_what_moves_in_it() -> None:
+    reach = Reach(np.array([[0.2, 0.3, 0.4], [0.8, 0.8, 0.8]]), 1.0, 0.05, 0.1)
+    state = np.zeros((2, 8))
+    state[:, :3] = 0.9 * reach.reference
+    assert room_left(state, 0.9, reach) == pytest.approx(0.9 * 0.05 - 0.1 * 0.1)
+    state[0, 1] += 0.004
+    assert room_left(state, 0.9, reach) == pytest.approx(0.9 * 0.05 - 0.1 * 0.1 - 2.0 * 0.004)
+    state[:, :3] = 1.2 * reach.reference
+    assert room_left(state, 1.2, reach) == pytest.approx(1.2 * 0.05)
 
 
 @pytest.mark.parametrize(
