@@ -13,17 +13,21 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
-from typing import Any, Final
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.errors import CellError, EngineError
+from filtercake.errors import CellError
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import class_radii, place_spheres
 from filtercake.packing.similarity import LARGEST_LOAD, check_rigid
 from filtercake.units import FloatArray
+
+if TYPE_CHECKING:
+    from filtercake.packing.cell_box import CellBox
 
 CHECK_STEPS: Final = 500
 """Time steps between two looks at the cell."""
@@ -181,7 +185,7 @@ class Look:
     Attributes
     ----------
     step : int
-        Time steps done.
+        Time steps since the cloud.
     stress : ndarray, shape (3, 3)
         Stress of the contacts, Pa, compression positive.
     porosity, rigid_porosity : float
@@ -229,9 +233,9 @@ class PressedCell:
     last : Look
         What was found at the end: stress, porosities, coordination, balance.
     steps : int
-        Time steps.
+        Time steps since the cloud, or the stress before.
     wall_time : float
-        Time that it took, s.
+        Time that they took, s.
     reasons : tuple of str
         Why it is not accepted; empty when it is.
     """
@@ -262,23 +266,59 @@ def press(scene: CellScene) -> PressedCell:
     EngineError
         If the cell explodes.
     """
+    return press_along(scene, [scene.stress])[0]
+
+
+def press_along(scene: CellScene, stresses: Sequence[float]) -> list[PressedCell]:
+    """Lead one cell from stress to stress, to rest at each: how a cake is compressed.
+
+    Parameters
+    ----------
+    scene : CellScene
+        What is asked for; ``patience`` is that at each stress.
+    stresses : sequence of float
+        Stresses, Pa, instead of the scene's; each at most about twice the one before, and the first, with friction,
+        at most four times what cohesion holds.
+
+    Returns
+    -------
+    list of PressedCell
+        One for each stress; it ends with the first that is not accepted.
+
+    Raises
+    ------
+    CellError, CloudError, EngineError
+        As :func:`press`; CellError for a stress that no cell can have.
+    """
     # who plans a study need not wait for the compiler
     from filtercake.packing.cell_box import CellBox
 
-    started = time.monotonic()
+    if not stresses:
+        raise CellError("stresses = (none): must be at least one")
+    scenes = [replace(scene, stress=stress) for stress in stresses]
     side = (scene.solids / (1.0 - scene.void_fraction)) ** (1.0 / 3.0)
-    box = CellBox(scene, place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
-    looks = [box.look()]
-    while unrest(scene, looks) and box.step < scene.patience:
-        box.advance(min(CHECK_STEPS, scene.patience - box.step))
+    box = CellBox(scenes[0], place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
+    found: list[PressedCell] = []
+    for stage in scenes:
+        box.lead_to(stage)
+        found.append(_rest(box))
+        if not found[-1].accepted:
+            break
+    return found
+
+
+def _rest(box: CellBox) -> PressedCell:
+    """Advance a cell until it is at rest under its stress, or patience ends."""
+    scene, started, end = box.scene, time.monotonic(), box.step + box.scene.patience
+    first, looks = box.step, [box.look()]
+    while unrest(scene, looks) and box.step < end:
+        box.advance(min(CHECK_STEPS, end - box.step))
         looks.append(box.look())
-        if not math.isfinite(looks[-1].pressure):
-            raise EngineError(
-                "the cell exploded: positions are no longer finite; use a shorter time step", outcome="exploded"
-            )
     position = box.positions()
     reasons = (*unrest(scene, looks), *refusals(scene, looks[-1], position, box.length))
-    return PressedCell(position, scene.radius, box.length, looks[-1], box.step, time.monotonic() - started, reasons)
+    return PressedCell(
+        position, scene.radius, box.length, looks[-1], box.step - first, time.monotonic() - started, reasons
+    )
 
 
 def unrest(scene: CellScene, looks: list[Look]) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from filtercake.errors import CellError
+from filtercake.errors import CellError, EngineError
 from filtercake.packing import cell_kernels, contact_law
 from filtercake.packing.cell import CellScene, Look
 from filtercake.packing.cloud import size_levels
@@ -47,7 +47,7 @@ class CellBox:
         mass = scene.density * 4.0 / 3.0 * np.pi * scene.radius**3 * scene.heaviness
         self.spheres = np.column_stack([position, scene.radius, np.zeros((n, 3)), mass])
         self.velocity, self.spin = np.zeros((n, 3)), np.zeros((n, 3))
-        self.drag = scene.drag * scene.rate / scene.heaviness
+        self.drag = np.empty(n)
         self.identity, self.level = np.arange(n), size_levels(scene.radius)
         self.largest = np.array(
             [scene.radius[self.level == k].max(initial=0.0) for k in range(int(self.level.max()) + 1)]
@@ -56,7 +56,6 @@ class CellBox:
         self.widest = 2.0 * float(scene.radius.max())
         self.box = np.array([length, 0.0])
         self.law = _law(scene)
-        self.servo = cell_kernels.Servo(scene.stress, scene.servo * scene.rate / 3.0)
         self.kernel = cell_kernels.make_advance(scene.cohesion > 0.0, self.frictional)
         self.averages = cell_kernels.make_measure(scene.cohesion > 0.0, self.frictional)
         self.find_pairs = kernels.make_find_pairs(False)
@@ -64,7 +63,14 @@ class CellBox:
         self.listed_at = 0
         self.skin = SKIN_DIAMETERS[1] * self.smallest
         self._partners: kernels.Pairs | None = None  # as the pairs, by sphere instead of by image
+        self.lead_to(scene)
         self._list_pairs()
+
+    def lead_to(self, scene: CellScene) -> None:
+        """Go on to the stress of another scene that differs in nothing else; drag and servo follow from it."""
+        self.scene = scene
+        self.servo = cell_kernels.Servo(scene.stress, scene.servo * scene.rate / 3.0)
+        self.drag[:] = (scene.drag * scene.rate / scene.heaviness)[self.identity]
 
     @property
     def length(self) -> float:
@@ -82,7 +88,15 @@ class CellBox:
         return np.asarray(self.spheres[:, kernels.MASS] @ self.velocity)
 
     def advance(self, steps: int) -> None:
-        """Advance by ``steps`` time steps."""
+        """Advance by ``steps`` time steps.
+
+        Raises
+        ------
+        CellError
+            If the box becomes too narrow for its largest sphere.
+        EngineError
+            If the cell explodes.
+        """
         end = self.step + steps
         while self.step < end:
             done, worn = self.kernel(
@@ -91,6 +105,10 @@ class CellBox:
             self.step += int(done)
             self.spheres[:, :3] = self.bodies.state[: self.identity.size, :3]
             self.spin[:] = self.bodies.spin[: self.identity.size]
+            if not (np.isfinite(self.spheres[:, :3]).all() and np.isfinite(self.box).all()):
+                raise EngineError(
+                    "the cell exploded: positions are no longer finite; use a shorter time step", outcome="exploded"
+                )
             if worn:
                 self._list_pairs()
 

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
-from filtercake.errors import CellError, CloudError
+from filtercake.errors import CellError, CloudError, EngineError
 from filtercake.packing import contact_law
 from filtercake.packing.cell import (
     ANISOTROPY_LIMIT,
@@ -23,6 +23,7 @@ from filtercake.packing.cell import (
     Look,
     PressedCell,
     press,
+    press_along,
     refusals,
     unrest,
 )
@@ -235,6 +236,29 @@ def test_porosity_follows_load_over_strength_alone() -> None:
     assert heavy.last.overlap > 2.0 * light.last.overlap
     assert heavy.last.rigid_porosity == pytest.approx(light.last.rigid_porosity, abs=0.006)
     assert loose.last.rigid_porosity > light.last.rigid_porosity + 0.008
+
+
+def test_a_cell_is_led_from_stress_to_stress() -> None:
+    scene = scene_of(HALVES, 300, x=2, stress=20.0, friction=0.05)
+    found = press_along(scene, [20.0, 40.0, 80.0])
+    assert all(cell.accepted for cell in found), [cell.reasons for cell in found]
+    assert [round(cell.last.pressure / 20.0, 1) for cell in found] == [1.0, 2.0, 4.0]
+    porosity = [cell.last.rigid_porosity for cell in found]
+    assert porosity[0] > porosity[1] + 0.005 > porosity[2] + 0.010
+    assert found[2].steps < found[0].steps
+    (alone,) = press_along(replace(scene, patience=600), [20.0, 40.0])
+    assert not alone.accepted
+    with pytest.raises(CellError, match="stresses = "):
+        press_along(scene, [])
+    with pytest.raises(CellError, match="stress = 1000 Pa"):
+        press_along(scene, [20.0, 1000.0])
+
+
+def test_a_cell_that_explodes_says_so() -> None:
+    box = box_of(scene_of(particles=100))
+    box.velocity[0] = math.nan
+    with pytest.raises(EngineError, match="exploded"):
+        box.advance(500)
 
 
 def test_small_spheres_that_move_as_if_heavier_pack_alike_in_fewer_steps() -> None:
