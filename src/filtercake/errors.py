@@ -92,6 +92,10 @@ class CloudError(FiltercakeError):
     """The spheres could not be placed without overlap."""
 
 
+class CellError(FiltercakeError):
+    """A pressure cell cannot be made of what is given, or its stress leaves the limit of rigid spheres."""
+
+
 class EngineError(FiltercakeError):
     """The packing engine could not run, or stopped with an error of its own.
 

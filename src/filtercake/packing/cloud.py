@@ -146,13 +146,7 @@ def make_cloud(
     CloudError
         If a sphere finds no free place (void fraction too small for a narrow distribution).
     """
-    from filtercake.packing.cloud_kernels import place
-
-    if particles < 1:
-        raise CloudError("the cloud holds no sphere; particles must be at least 1")
-    packed = merge_rare(csd, particles)
-    counts = packed.class_counts(particles)
-    radius = np.repeat(0.5 * packed.size[::-1], counts[::-1])
+    radius = class_radii(csd, particles)
     length = box_length(csd, particles, void_fraction, bed_depth_factor)
     if 2.0 * radius[0] > length:
         raise CloudError(
@@ -160,17 +154,56 @@ def make_cloud(
             f"({length / MICROMETRE:.4g} um); use more particles than {particles}"
         )
     height = PLACEMENT_HEIGHT * bed_depth_factor * length
-    position = np.empty((particles, 3))
+    return Cloud(place_spheres(radius, length, height, seed), radius, length, height)
+
+
+def class_radii(csd: CrystalSizeDistribution, particles: int) -> FloatArray:
+    """Radii of N spheres, m, shape (N,), the largest first: rare classes merged, counts by largest remainder."""
+    if particles < 1:
+        raise CloudError("the cloud holds no sphere; particles must be at least 1")
+    packed = merge_rare(csd, particles)
+    counts = packed.class_counts(particles)
+    return np.repeat(0.5 * packed.size[::-1], counts[::-1])
+
+
+def place_spheres(radius: FloatArray, length: float, height: float, seed: int, *, periodic: bool = False) -> FloatArray:
+    """Place spheres by random sequential addition in a box that is periodic in x and y.
+
+    Parameters
+    ----------
+    radius : ndarray, shape (n,)
+        Radii, m, the largest first.
+    length, height : float
+        Side and height of the box, m.
+    seed : int
+        Seed of the random stream.
+    periodic : bool
+        Whether the box is periodic in z too; otherwise the spheres lie wholly between 0 and ``height``.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Centres, m.
+
+    Raises
+    ------
+    CloudError
+        If a sphere finds no free place.
+    """
+    from filtercake.packing.cloud_kernels import place
+
+    position = np.empty((radius.size, 3))
     rng = np.random.Generator(np.random.PCG64(seed))
     level, cells = _grid_levels(radius, length, height)
     # unit lengths of the box keep the kernel free of any unit system
-    placed = place(position, radius / length, height / length, level, cells, rng, MAX_ATTEMPTS)
-    if placed < particles:
+    placed = place(position, radius / length, height / length, level, cells, rng, MAX_ATTEMPTS, periodic)
+    if placed < radius.size:
+        void_fraction = 1.0 - 4.0 / 3.0 * np.pi * float(np.sum(radius**3)) / (length**2 * height)
         raise CloudError(
-            f"sphere {placed + 1} of {particles} ({2.0 * radius[placed] / MICROMETRE:.4g} um) found no free place "
+            f"sphere {placed + 1} of {radius.size} ({2.0 * radius[placed] / MICROMETRE:.4g} um) found no free place "
             f"in {MAX_ATTEMPTS} tries at void fraction {void_fraction:g}; use a larger void_fraction"
         )
-    return Cloud(position * length, radius, length, height)
+    return position * length
 
 
 def size_levels(radius: FloatArray) -> IntArray:

@@ -17,8 +17,9 @@ def place(
     cells: IntArray,
     rng: np.random.Generator,
     max_attempts: int,
+    periodic: bool,
 ) -> int:
-    """Fill ``position`` (box side 1) and return how many spheres found a place."""
+    """Fill ``position`` (box side 1) and return how many spheres found a place; ``periodic`` is the box's height."""
     n = radius.size
     start = np.zeros(cells.shape[0] + 1, dtype=np.int64)
     for k in range(cells.shape[0]):
@@ -32,8 +33,8 @@ def place(
         for _ in range(max_attempts):
             x = rng.random()
             y = rng.random()
-            z = r + rng.random() * (height - 2.0 * r)
-            if _is_free(x, y, z, r, position, radius, height, cells, start, head, following, reach):
+            z = rng.random() * height if periodic else r + rng.random() * (height - 2.0 * r)
+            if _is_free(x, y, z, r, position, radius, height, cells, start, head, following, reach, periodic):
                 found = True
                 break
         if not found:
@@ -69,6 +70,7 @@ def _is_free(
     head: IntArray,
     following: IntArray,
     reach: FloatArray,
+    periodic: bool,
 ) -> bool:
     """Whether a sphere at (x, y, z) overlaps none of those placed so far."""
     for k in range(cells.shape[0]):
@@ -81,9 +83,12 @@ def _is_free(
         z0 = max(0, int((z - span) / height * nz)) if z > span else 0
         z1 = min(nz - 1, int((z + span) / height * nz))
         x1, y1 = min(x1, x0 + nx - 1), min(y1, y0 + ny - 1)
+        if periodic:
+            z0 = int(np.floor((z - span) / height * nz))
+            z1 = min(int(np.floor((z + span) / height * nz)), z0 + nz - 1)
         for cz in range(z0, z1 + 1):
             for cy in range(y0, y1 + 1):
-                row = start[k] + (cz * ny + cy % ny) * nx
+                row = start[k] + (cz % nz * ny + cy % ny) * nx
                 for cx in range(x0, x1 + 1):
                     j = head[row + cx % nx]
                     while j >= 0:
@@ -91,6 +96,8 @@ def _is_free(
                         dx -= np.round(dx)
                         dy -= np.round(dy)
                         dz = z - position[j, 2]
+                        if periodic:
+                            dz -= height * np.round(dz / height)
                         gap = r + radius[j]
                         if dx * dx + dy * dy + dz * dz < gap * gap:
                             return False

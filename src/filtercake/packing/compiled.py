@@ -7,12 +7,14 @@ all will do, and nothing is opened before a kernel is first called.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 import tempfile
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar, overload
 
 from numba import njit
@@ -116,4 +118,17 @@ class _Results(CompileResultCacheImpl):
 
 
 class _Files(FunctionCache):
+    """Numba's cache, which sees changes of a function's own file alone; here also of the kernels it calls in others."""
+
     _impl_class = _Results
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return (*super()._index_key(sig, codegen), *self._borrowed)  # type: ignore[no-untyped-call]
+
+    @cached_property
+    def _borrowed(self) -> tuple[str, ...]:
+        """Digests of the modules with kernels that the function's own module names."""
+        named = self._py_func.__globals__.values()
+        modules = {value for value in named if isinstance(value, ModuleType) and value.__name__.endswith("_kernels")}
+        files = sorted(str(module.__file__) for module in modules)
+        return tuple(hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files)

@@ -80,6 +80,45 @@ def cohesive_strength(cohesion: float, youngs_modulus: float, poisson_ratio: flo
     return math.pi**3 / 24.0 * cohesion**3 / effective_modulus(youngs_modulus, poisson_ratio) ** 2
 
 
+def cohesion_of_strength(strength: float, youngs_modulus: float, poisson_ratio: float) -> float:
+    """Cohesion energy density that holds a stress (Pa), J/m3: the inverse of :func:`cohesive_strength`."""
+    modulus = effective_modulus(youngs_modulus, poisson_ratio)
+    return math.cbrt(24.0 / math.pi**3 * strength * modulus**2)
+
+
+def adhesive_strength(adhesion: float, diameter: float) -> float:
+    """Stress that a surface's work of adhesion W holds, Pa: ``(3 pi / 8) W / d``.
+
+    The pull-off force of two equal spheres (JKR) is ``1.5 pi W R*`` with R* = d/4; over d squared.
+
+    Parameters
+    ----------
+    adhesion : float
+        Work of adhesion W, J/m2.
+    diameter : float
+        Diameter of the spheres, m.
+    """
+    return 3.0 * math.pi / 8.0 * adhesion / diameter
+
+
+def effective_shear_modulus(youngs_modulus: float, poisson_ratio: float) -> float:
+    """Effective shear modulus G* of two equal materials in contact, Pa: ``G / (2 (2 - nu))``."""
+    return shear_modulus(youngs_modulus, poisson_ratio) / (2.0 * (2.0 - poisson_ratio))
+
+
+def shear_stiffness_ratio(youngs_modulus: float, poisson_ratio: float) -> float:
+    """Tangential over normal stiffness constant of Mindlin's contact: 8 G* over 4/3 E*."""
+    return (
+        6.0 * effective_shear_modulus(youngs_modulus, poisson_ratio) / effective_modulus(youngs_modulus, poisson_ratio)
+    )
+
+
+def shear_damping_ratio(youngs_modulus: float, poisson_ratio: float) -> float:
+    """Tangential over normal damping constant: the root of 8 G* over 2 E*."""
+    modulus = effective_modulus(youngs_modulus, poisson_ratio)
+    return math.sqrt(4.0 * effective_shear_modulus(youngs_modulus, poisson_ratio) / modulus)
+
+
 def cohesion_at_overlap(relative: float, youngs_modulus: float, poisson_ratio: float) -> float:
     """Cohesion energy density at which equal spheres overlap by ``relative`` of their diameter, J/m3."""
     modulus = effective_modulus(youngs_modulus, poisson_ratio)

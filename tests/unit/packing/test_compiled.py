@@ -94,3 +94,17 @@ def test_importing_compiles_nothing_and_writes_nothing(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True, env=environment)
     assert done.stdout.strip() == str(tree / "__init__.py"), done.stderr
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+
+
+def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(script: Path) -> None:
+    borrowed = script.with_name("other_kernels.py")
+    kernel = "from filtercake.packing.compiled import cached_njit\n\n@cached_njit\ndef times(x):\n    return {} * x\n"
+    borrowed.write_text(kernel.format(2.0))
+    script.write_text(
+        KERNEL.replace("2.0 * x", "other.times(x)").replace("\n\n@", "\nimport other_kernels as other\n\n@", 1)
+    )
+    assert run(script)[:2] == ("42.0", False)
+    assert run(script)[:2] == ("42.0", True)
+    borrowed.write_text(kernel.format(3.0))
+    assert run(script)[:2] == ("63.0", False)
+    assert run(script)[:2] == ("63.0", True)

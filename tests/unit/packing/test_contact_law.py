@@ -132,3 +132,22 @@ def test_no_cohesion_means_no_overlap_and_no_pull() -> None:
     assert contact_law.equilibrium_overlap(0.0, E, NU, 1e-5, 1e-5) == 0.0
     assert contact_law.pull_off_force(0.0, E, NU, 1e-5, 1e-5) == 0.0
     assert contact_law.soft_contact_compaction(0.36, 0.0, E, NU) == 0.0
+
+
+@given(cohesions, moduli, poissons)
+def test_cohesion_of_a_strength_is_the_inverse(s: float, youngs: float, poisson: float) -> None:
+    strength = contact_law.cohesive_strength(s, youngs, poisson)
+    assert contact_law.cohesion_of_strength(strength, youngs, poisson) == pytest.approx(s, rel=1e-12)
+    assert contact_law.cohesion_of_strength(0.0, youngs, poisson) == 0.0
+
+
+def test_adhesive_strength_by_hand() -> None:
+    # pull-off 1.5 pi 0.01 J/m2 5 um = 0.2356 uN over (20 um)^2
+    assert contact_law.adhesive_strength(0.01, 20e-6) == pytest.approx(589.05, rel=1e-5)
+
+
+@given(moduli, poissons)
+def test_tangential_constants_depend_on_poissons_ratio_alone(youngs: float, poisson: float) -> None:
+    shear = (1.0 - poisson) / (2.0 * (2.0 - poisson))  # G* over E*
+    assert contact_law.shear_stiffness_ratio(youngs, poisson) == pytest.approx(6.0 * shear, rel=1e-12)
+    assert contact_law.shear_damping_ratio(youngs, poisson) == pytest.approx(2.0 * math.sqrt(shear), rel=1e-12)

@@ -145,16 +145,13 @@ class Bed:
     def _set_material(self) -> None:
         scene = self.scene
         self.modulus = contact_law.effective_modulus(scene.youngs_modulus, scene.poisson_ratio)
-        shear = contact_law.shear_modulus(scene.youngs_modulus, scene.poisson_ratio) / (
-            2.0 * (2.0 - scene.poisson_ratio)
-        )
         self.damping_ratio = contact_law.damping_ratio(scene.restitution)
         self.law = kernels.Law(
             float(self.gravity),
             float(scene.cohesion),
             float(scene.friction),
-            6.0 * shear / self.modulus,  # 8 G* over 4/3 E*
-            math.sqrt(4.0 * shear / self.modulus),  # root of 8 G* over 2 E*
+            contact_law.shear_stiffness_ratio(scene.youngs_modulus, scene.poisson_ratio),
+            contact_law.shear_damping_ratio(scene.youngs_modulus, scene.poisson_ratio),
             float(self.length),
             float(scene.time_step),
         )

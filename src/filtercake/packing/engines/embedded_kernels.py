@@ -511,7 +511,7 @@ def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
 
 
 @_compiled
-def _pair_forces(
+def pair_forces(
     part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, cohesive: bool, frictional: bool
 ) -> None:
     """Add the forces and torques of the pairs of one part's spheres to its layers."""
@@ -725,7 +725,7 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                         _pick_near(t, state, pairs, patches, law)
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
-                    _pair_forces(t, bodies, pairs, law, spring_step, cohesive, frictional)
+                    pair_forces(t, bodies, pairs, law, spring_step, cohesive, frictional)
                 if parts > 1:
                     for t in prange(parts):
                         _add_layers(t, bodies, frictional)

@@ -1,0 +1,260 @@
+"""The box of a pressure cell: its spheres, their images, the pairs in a box that deforms, and the time loop.
+
+Pairs are searched as the embedded engine does, in a box periodic in x and y, with the spheres near the bottom once more
+on top; then every image that a pair needs becomes a row of its own behind the spheres.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from filtercake.errors import CellError, EngineError
+from filtercake.packing import cell_kernels, contact_law
+from filtercake.packing.cell import CellScene, Look
+from filtercake.packing.cloud import size_levels
+from filtercake.packing.engines import embedded_kernels as kernels
+from filtercake.units import MICROMETRE, FloatArray, IntArray
+
+SKIN_DIAMETERS: Final = (0.06, 1.0)
+"""Narrowest and widest neighbour skin, over the smallest diameter."""
+LISTING_STEPS: Final = 250
+"""Time steps that a list of pairs should last."""
+LEAST_SIDES: Final = 2.0
+"""Side of the box over the largest diameter and the skin: any two spheres touch at one image only."""
+
+
+class _Found(NamedTuple):
+    """Pairs, each once: the first sphere, the second, and which image of it, (m, 3) in sides of the box."""
+
+    first: IntArray
+    second: IntArray
+    image: IntArray
+
+
+class CellBox:
+    """Spheres in a periodic box under a servo.
+
+    Rows of the arrays are sorted in space at every listing; ``identity`` says which sphere of the scene each is.
+    """
+
+    def __init__(self, scene: CellScene, position: FloatArray, length: float):
+        """Start at rest from centres (n, 3), m, in the order of the scene's radii, in a box of side ``length``, m."""
+        n = scene.radius.size
+        self.scene, self.step = scene, 0
+        self.frictional = scene.friction > 0.0
+        mass = scene.density * 4.0 / 3.0 * np.pi * scene.radius**3 * scene.heaviness
+        self.spheres = np.column_stack([position, scene.radius, np.zeros((n, 3)), mass])
+        self.velocity, self.spin = np.zeros((n, 3)), np.zeros((n, 3))
+        self.drag = np.empty(n)
+        self.identity, self.level = np.arange(n), size_levels(scene.radius)
+        self.largest = np.array(
+            [scene.radius[self.level == k].max(initial=0.0) for k in range(int(self.level.max()) + 1)]
+        )
+        self.smallest = 2.0 * float(scene.radius.min())
+        self.widest = 2.0 * float(scene.radius.max())
+        self.box = np.array([length, 0.0])
+        self.law = _law(scene)
+        self.kernel = cell_kernels.make_advance(scene.cohesion > 0.0, self.frictional)
+        self.averages = cell_kernels.make_measure(scene.cohesion > 0.0, self.frictional)
+        self.find_pairs = kernels.make_find_pairs(False)
+        self.room = 8 * n
+        self.listed_at = 0
+        self.skin = SKIN_DIAMETERS[1] * self.smallest
+        self._partners: kernels.Pairs | None = None  # as the pairs, by sphere instead of by image
+        self.lead_to(scene)
+        self._list_pairs()
+
+    def lead_to(self, scene: CellScene) -> None:
+        """Go on to the stress of another scene that differs in nothing else; drag and servo follow from it."""
+        self.scene = scene
+        self.servo = cell_kernels.Servo(scene.stress, scene.servo * scene.rate / 3.0)
+        self.drag[:] = (scene.drag * scene.rate / scene.heaviness)[self.identity]
+
+    @property
+    def length(self) -> float:
+        """Side of the box, m."""
+        return float(self.box[0])
+
+    def positions(self) -> FloatArray:
+        """Centres in the box, m, shape (n, 3), in the order of the scene's radii."""
+        found = np.empty_like(self.velocity)
+        found[self.identity] = _wrapped(self.spheres[:, :3], self.length)
+        return found
+
+    def momentum(self) -> FloatArray:
+        """Momentum relative to the box, kg m/s, shape (3,)."""
+        return np.asarray(self.spheres[:, kernels.MASS] @ self.velocity)
+
+    def advance(self, steps: int) -> None:
+        """Advance by ``steps`` time steps.
+
+        Raises
+        ------
+        CellError
+            If the box becomes too narrow for its largest sphere.
+        EngineError
+            If the cell explodes.
+        """
+        end = self.step + steps
+        while self.step < end:
+            done, worn = self.kernel(
+                end - self.step, self.bodies, self.motion, self.pairs, self.law, self.servo, self.reach
+            )
+            self.step += int(done)
+            self.spheres[:, :3] = self.bodies.state[: self.identity.size, :3]
+            self.spin[:] = self.bodies.spin[: self.identity.size]
+            if not (np.isfinite(self.spheres[:, :3]).all() and np.isfinite(self.box).all()):
+                raise EngineError(
+                    "the cell exploded: positions are no longer finite; use a shorter time step", outcome="exploded"
+                )
+            if worn:
+                self._list_pairs()
+
+    def look(self) -> Look:
+        """Take the averages of the present state."""
+        found = self.averages(self.bodies, self.motion, self.pairs, self.law)
+        porosity = 1.0 - self.scene.solids / self.length**3
+        return Look(
+            step=self.step,
+            stress=found.stress,
+            porosity=porosity,
+            rigid_porosity=porosity + 3.0 * (1.0 - porosity) * found.overlap,
+            coordination=2.0 * found.contacts / self.identity.size,
+            overlap=found.overlap,
+            force_ratio=found.net_force / found.contact_force if found.contacts else np.inf,
+        )
+
+    def _list_pairs(self) -> None:
+        """Sort the spheres in space and list their pairs anew; tangential springs are carried over."""
+        self.skin, self.listed_at = self._choose_skin(), self.step
+        if self.length < LEAST_SIDES * (self.widest + self.skin):
+            raise CellError(
+                f"the box, {self.length / MICROMETRE:.4g} um, is narrower than {LEAST_SIDES:g} of its largest "
+                f"spheres ({self.widest / MICROMETRE:.4g} um) and the neighbour skin; use more spheres than "
+                f"{self.identity.size}"
+            )
+        self.spheres[:, :3] = _wrapped(self.spheres[:, :3], self.length)
+        order = kernels.sort_into_cells(
+            self.spheres, np.zeros_like(self.level), self.largest[:1], self.length, self.length
+        )[0]
+        for array in (self.spheres, self.velocity, self.spin, self.drag, self.identity, self.level):
+            array[:] = array[order]
+        self._fill(self._search(), order)
+
+    def _choose_skin(self) -> float:
+        """Skin, m, that lasts ``LISTING_STEPS``, from how long the last one lasted, within bounds."""
+        lasted = self.step - self.listed_at
+        low, high = (share * self.smallest for share in SKIN_DIAMETERS)
+        wanted = self.skin * LISTING_STEPS / lasted if lasted else self.skin
+        # a box of few spheres has little room to list
+        high = max(min(high, self.length / LEAST_SIDES - self.widest), low)
+        return min(max(wanted, low), high)
+
+    def _search(self) -> _Found:
+        """Find the pairs closer than the skin."""
+        n, length = self.identity.size, self.length
+        above = np.flatnonzero(self.spheres[:, kernels.Z] < self.spheres[:, 3] + 0.5 * self.widest + self.skin)
+        owner = np.concatenate([np.arange(n), above])
+        rows = self.spheres[owner]
+        rows[n:, kernels.Z] += length
+        level = self.level[owner]
+        cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
+        top = float(rows[:, kernels.Z].max())
+        index, start, shape, offset = kernels.sort_into_cells(rows, level, cell_size, length, top)
+        place = np.empty_like(index)
+        place[index] = np.arange(index.size)
+        grid = kernels.Grid(length, level, rows[index, :4], index, place, start, shape, offset, self.largest, cell_size)
+        first, neighbour = self._raw_pairs(rows, grid)
+        second, code = (
+            (neighbour & kernels.INDEX_MASK).astype(np.int64),
+            (neighbour >> kernels.IMAGE_SHIFT).astype(np.int64),
+        )
+        high = (np.arange(owner.size) >= n).astype(np.int64)
+        image = np.column_stack([code % 3 - 1, code // 3 - 1, high[second] - high[first]])
+        keep = (high[first] == 0) | (high[second] == 0)  # both on top: the pair is below, too
+        return _Found(owner[first[keep]], owner[second[keep]], image[keep])
+
+    def _raw_pairs(self, rows: FloatArray, grid: kernels.Grid) -> tuple[IntArray, kernels.Neighbours]:
+        """First row of each pair, and the second with the code of its image."""
+        size = rows.shape[0]
+        first, last = np.empty(size, dtype=np.uint64), np.empty(size, dtype=np.uint64)
+        while True:
+            pairs = _pairs(first, last, np.empty(self.room, dtype=np.uint32), False)._replace(
+                bounds=np.array([0, size])
+            )
+            count = self.find_pairs(rows, grid, self.skin, pairs)
+            if count < self.room:
+                counts = (last - first).astype(np.int64)
+                return np.repeat(np.arange(size), counts), pairs.neighbour[:count]
+            self.room = int(1.3 * count) + 64
+
+    def _fill(self, found: _Found, order: IntArray) -> None:
+        """Make images, pairs by sphere, and what the time loop works on, from the pairs found."""
+        n = self.identity.size
+        by_first = np.argsort(found.first, kind="stable")
+        second, image = found.second[by_first], found.image[by_first]
+        key = ((image[:, 2] + 1) * 9 + (image[:, 1] + 1) * 3 + image[:, 0] + 1) * n + second
+        away = image.any(axis=1)
+        images, which = np.unique(key[away], return_inverse=True)
+        row = second.copy()
+        row[away] = n + which
+        code, owner = np.divmod(images, n)
+        shift = np.column_stack([code % 3, code // 3 % 3, code // 9]) - 1.0
+        bounds = np.searchsorted(found.first[by_first], np.arange(n + 1)).astype(np.uint64)
+        same = np.uint32(kernels.SAME_IMAGE) << kernels.IMAGE_SHIFT
+        self.motion = cell_kernels.Motion(self.velocity, self.drag, owner, shift, self.box)
+        rows = np.concatenate([np.arange(n), owner])
+        layers = (1, rows.size, 3)
+        self.bodies = kernels.Bodies(self.spheres[rows], self.spin[rows], np.zeros(layers), np.zeros(layers))
+        self.pairs = _pairs(bounds[:-1], bounds[1:], row.astype(np.uint32) | same, self.frictional)
+        kernels.pair_constants(
+            self.bodies.state, self.pairs, self.scene.modulus, contact_law.damping_ratio(self.scene.restitution)
+        )
+        if self.frictional:
+            partners = self.pairs._replace(neighbour=second.astype(np.uint32))
+            if self._partners is not None:
+                kernels.carry_springs(order, self._partners, partners)
+            self._partners = partners
+        self.reach = cell_kernels.Reach(self.spheres[:, :3].copy(), self.length, self.skin, self.widest)
+
+
+def _wrapped(position: FloatArray, length: float) -> FloatArray:
+    """Centres in [0, length), m."""
+    found = position % length
+    found[found >= length] = 0.0
+    return np.asarray(found)
+
+
+def _law(scene: CellScene) -> kernels.Law:
+    """Collect what is the same for all spheres; images have rows of their own, so that no length is needed."""
+    material = scene.youngs_modulus, scene.poisson_ratio
+    return kernels.Law(
+        gravity=0.0,
+        cohesion=float(scene.cohesion),
+        friction=float(scene.friction),
+        shear_stiffness=contact_law.shear_stiffness_ratio(*material),
+        shear_damping=contact_law.shear_damping_ratio(*material),
+        length=0.0,
+        time_step=scene.time_step,
+    )
+
+
+def _pairs(
+    first: kernels.Unsigned, last: kernels.Unsigned, neighbour: kernels.Neighbours, frictional: bool
+) -> kernels.Pairs:
+    """Make a pair list; all pairs count as near ones."""
+    constants = np.empty((neighbour.size, 2))
+    return kernels.Pairs(
+        bounds=np.array([0, first.size]),
+        first=first,
+        last=last,
+        neighbour=neighbour,
+        constants=constants,
+        spring=np.zeros((max(neighbour.size, 1) if frictional else 1, 3)),
+        near_last=last,
+        near_neighbour=neighbour,
+        near_constants=constants,
+        near_pair=np.arange(neighbour.size, dtype=np.uint32),
+    )

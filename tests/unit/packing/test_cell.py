@@ -1,0 +1,428 @@
+"""The pressure cell: closed forms of two spheres in it, what it conserves, and packings that are known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from filtercake.crystals.csd import CrystalSizeDistribution, mixture
+from filtercake.errors import CellError, CloudError, EngineError
+from filtercake.packing import contact_law
+from filtercake.packing.cell import (
+    ANISOTROPY_LIMIT,
+    CHECK_STEPS,
+    WINDOW_STEPS,
+    CellScene,
+    Look,
+    PressedCell,
+    press,
+    press_along,
+    refusals,
+    unrest,
+)
+from filtercake.packing.cell_box import CellBox
+from filtercake.packing.cell_kernels import Reach, room_left
+from filtercake.packing.cloud import place_spheres
+from filtercake.packing.similarity import LARGEST_LOAD, LARGEST_STRENGTH, check_rigid, similar, strength_of_adhesion
+
+UM = 1e-6
+E, NU = 5e6, 0.2
+E_STAR = contact_law.effective_modulus(E, NU)
+ONE_SIZE = ((30,), (1.0,))
+HALVES = ((20, 50), (0.5, 0.5))
+Sizes = tuple[tuple[int, ...], tuple[float, ...]]
+
+
+def csd_of(sizes: Sizes) -> CrystalSizeDistribution:
+    return mixture([d * UM for d in sizes[0]], list(sizes[1]))
+
+
+def scene_of(sizes: Sizes = ONE_SIZE, particles: int = 400, **changed: Any) -> CellScene:
+    given = {"stress": 88.0, "density": 1180.0, **changed}
+    if "x" in given:
+        given["cohesion"] = contact_law.cohesion_of_strength(given["stress"] / given.pop("x"), E, NU)
+    return CellScene.from_csd(csd_of(sizes), particles, **given)
+
+
+@cache
+def pressed(sizes: Sizes = ONE_SIZE, particles: int = 400, **changed: Any) -> PressedCell:
+    return press(scene_of(sizes, particles, **changed))
+
+
+def box_of(scene: CellScene) -> CellBox:
+    side = (scene.solids / (1.0 - scene.void_fraction)) ** (1.0 / 3.0)
+    return CellBox(scene, place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
+
+
+def two(overlap: float, way: np.ndarray, at: np.ndarray, **changed: Any) -> CellBox:
+    """Two spheres of 30 and 20 um, the second ``way`` from the first, in a box of 200 um."""
+    radius = np.array([15 * UM, 10 * UM])
+    scene = CellScene(radius=radius, stress=88.0, density=1180.0, servo=1e-5, **changed)
+    apart = (radius.sum() - overlap) * way / np.linalg.norm(way)
+    return CellBox(scene, np.array([at, at + apart]) % (200 * UM), 200 * UM)
+
+
+MIDDLE = np.full(3, 100 * UM)
+PLACES = [MIDDLE, np.zeros(3), np.array([195.0, 100.0, 195.0]) * UM, np.array([195.0, 190.0, 195.0]) * UM]
+
+
+@pytest.mark.parametrize("at", PLACES, ids=["inside", "corner", "edge", "beyond"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_two_spheres_carry_hertz_wherever_they_lie(at: np.ndarray, friction: float) -> None:
+    way, overlap = np.array([1.0, 1.0, 2.0]), 0.05 * UM
+    normal = way / np.linalg.norm(way)
+    found = two(overlap, way, at, friction=friction).look()
+    force = 4.0 / 3.0 * E_STAR * math.sqrt(contact_law.effective_radius(15 * UM, 10 * UM)) * overlap**1.5
+    expected = force * (25 * UM - overlap) / (200 * UM) ** 3 * np.outer(normal, normal)
+    assert found.stress == pytest.approx(expected, rel=1e-6)
+    assert found.coordination == 1.0 and found.force_ratio == pytest.approx(1.0)
+    assert found.overlap == pytest.approx(overlap / (25 * UM))
+    assert found.rigid_porosity - found.porosity == pytest.approx(3.0 * (1.0 - found.porosity) * found.overlap)
+
+
+def test_two_sticky_spheres_balance_and_pull_off_as_the_closed_forms_say() -> None:
+    cohesion = 20e3
+    balance = contact_law.equilibrium_overlap(cohesion, E, NU, 15 * UM, 10 * UM)
+
+    def force(overlap: float) -> float:
+        found = two(overlap, np.array([1.0, 0.0, 0.0]), MIDDLE, cohesion=cohesion, friction=0.3).look()
+        return float(found.stress[0, 0] * (200 * UM) ** 3 / (25 * UM - overlap))
+
+    pull_off = contact_law.pull_off_force(cohesion, E, NU, 15 * UM, 10 * UM)
+    assert abs(force(balance)) < 0.01 * pull_off
+    assert force(4.0 / 9.0 * balance) == pytest.approx(-pull_off, rel=2e-3)
+    assert min(force(share * balance) for share in np.linspace(0.3, 0.6, 31)) == pytest.approx(-pull_off, rel=2e-3)
+
+
+@pytest.mark.parametrize("at", PLACES[:3], ids=["inside", "corner", "edge"])
+def test_two_spheres_rebound_with_their_restitution(at: np.ndarray) -> None:
+    box = two(-0.01 * UM, np.array([1.0, 0.0, 0.0]), at, restitution=0.3, drag=0.0)
+    first, second = np.argsort(box.identity)
+    speed = 0.02
+    box.velocity[first, 0], box.velocity[second, 0] = speed, -speed
+    momentum = box.momentum()
+    box.advance(400)
+    first, second = np.argsort(box.identity)
+    rebound = box.velocity[second, 0] - box.velocity[first, 0]
+    assert rebound / (2.0 * speed) == pytest.approx(0.3, abs=0.03)
+    assert box.momentum() == pytest.approx(momentum, rel=1e-9, abs=1e-22)
+
+
+def rubbed(at: np.ndarray) -> tuple[CellBox, np.ndarray, np.ndarray]:
+    """Two spheres that meet at a slant, after their contact has opened; velocities and spins in their order."""
+    box = two(-0.01 * UM, np.array([1.0, 0.0, 0.0]), at, friction=0.3, drag=0.0, restitution=0.9)
+    first, second = np.argsort(box.identity)
+    box.velocity[first], box.velocity[second] = (0.02, 0.015, 0.0), (-0.02, 0.0, 0.01)
+    for _ in range(10):
+        box.advance(60)
+        box._list_pairs()  # springs must survive it
+    back = np.argsort(box.identity)
+    return box, box.velocity[back], box.spin[back]
+
+
+def test_friction_turns_two_spheres_and_keeps_their_angular_momentum() -> None:
+    box, velocity, spin = rubbed(MIDDLE)
+    place, mass, radius = box.positions(), box.spheres[np.argsort(box.identity), 7], box.scene.radius
+    before = np.array([[0.02, 0.015, 0.0], [-0.02, 0.0, 0.01]])
+    start = np.array([MIDDLE, MIDDLE + np.array([25.01 * UM, 0.0, 0.0])])
+    wanted = np.cross(start, mass[:, None] * before).sum(axis=0)
+    found = np.cross(place, mass[:, None] * velocity).sum(axis=0) + 0.4 * (mass * radius**2) @ spin
+    about = mass.sum() * 25 * UM * 0.02
+    # the box shrinks a little meanwhile
+    assert found == pytest.approx(wanted, abs=2e-3 * about)
+    assert np.abs(spin).min(axis=0)[1:].min() > 10.0 and box.look().coordination == 0.0
+
+
+@pytest.mark.parametrize("at", PLACES[1:], ids=["corner", "edge", "beyond"])
+def test_friction_is_the_same_across_a_face(at: np.ndarray) -> None:
+    _, velocity, spin = rubbed(MIDDLE)
+    _, other_velocity, other_spin = rubbed(at)
+    assert other_velocity == pytest.approx(velocity, abs=1e-9)
+    assert other_spin == pytest.approx(spin, abs=1e-9 * np.abs(spin).max())
+
+
+def test_drag_stops_a_sphere_as_an_exponential() -> None:
+    box = two(-60 * UM, np.array([1.0, 0.0, 0.0]), MIDDLE, drag=2.0, friction=0.3)
+    box.velocity[:], box.bodies.spin[:] = 1e-3, 7.0
+    box.advance(200)
+    lasted = 200 * box.scene.time_step
+    assert box.velocity == pytest.approx(1e-3 * math.exp(-2.0 * box.scene.rate * lasted), rel=1e-4)
+    assert box.spin == pytest.approx(7e3 * box.velocity, rel=1e-9)
+
+
+def test_a_box_without_contacts_shrinks_at_the_servos_rate_and_carries_its_spheres_along() -> None:
+    box = box_of(scene_of(particles=50, void_fraction=0.97, servo=0.03))
+    side, places = box.length, box.positions() / box.length
+    box.advance(300)
+    rate = 0.03 * box.scene.rate / 3.0
+    assert box.length == pytest.approx(side * math.exp(-rate * 300 * box.scene.time_step), rel=1e-5)
+    assert box.positions() / box.length == pytest.approx(places, abs=1e-12)
+
+
+def test_the_room_of_a_pair_list_shrinks_with_the_box_and_with_what_moves_in_it() -> None:
+    reach = Reach(np.array([[0.2, 0.3, 0.4], [0.8, 0.8, 0.8]]), 1.0, 0.05, 0.1)
+    state = np.zeros((2, 8))
+    state[:, :3] = 0.9 * reach.reference
+    assert room_left(state, 0.9, reach) == pytest.approx(0.9 * 0.05 - 0.1 * 0.1)
+    state[0, 1] += 0.004
+    assert room_left(state, 0.9, reach) == pytest.approx(0.9 * 0.05 - 0.1 * 0.1 - 2.0 * 0.004)
+    state[:, :3] = 1.2 * reach.reference
+    assert room_left(state, 1.2, reach) == pytest.approx(1.2 * 0.05)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "friction"), [(ONE_SIZE, 0.0), (HALVES, 0.3), (((10, 20, 40), (0.15, 0.25, 0.6)), 0.0)]
+)
+def test_every_contact_is_listed_while_the_box_deforms_and_no_momentum_arises(sizes: Sizes, friction: float) -> None:
+    scene = scene_of(sizes, 300, friction=friction, cohesion=15e3, drag=0.5, servo=0.05)
+    box = box_of(scene)
+    for _ in range(25):
+        box.advance(331)
+        place, look = box.positions(), box.look()
+        assert ((place >= 0.0) & (place < box.length)).all()
+        pairs = cKDTree(place, boxsize=box.length).query_pairs(2.0 * scene.radius.max(), output_type="ndarray")
+        apart = place[pairs[:, 0]] - place[pairs[:, 1]]
+        apart -= box.length * np.rint(apart / box.length)
+        overlap = scene.radius[pairs].sum(axis=1) - np.linalg.norm(apart, axis=1)
+        assert (overlap > 0.0).sum() == round(0.5 * look.coordination * 300)
+        scale = float(box.spheres[:, 7] @ np.linalg.norm(box.velocity, axis=1))
+        assert np.abs(box.momentum()).max() <= 1e-12 * max(scale, 1e-30)
+    assert look.coordination > 2.0
+    assert np.array_equal(np.sort(box.identity), np.arange(300))
+    assert np.array_equal(box.spheres[:, 3], scene.radius[box.identity])
+
+
+def test_looking_changes_nothing() -> None:
+    seen, unseen = (box_of(scene_of(HALVES, 200, friction=0.3, x=10, servo=0.1)) for _ in range(2))
+    for _ in range(10):
+        seen.advance(400)
+        seen.look()
+    unseen.advance(4000)
+    # where the loop is called anew it takes real distances anew, and may list pairs at another step
+    assert seen.length == pytest.approx(unseen.length, rel=1e-6)
+
+
+def test_one_size_without_friction_is_random_close_packed() -> None:
+    found = [pressed(particles=500, seed=seed) for seed in range(1, 6)]
+    assert all(cell.accepted for cell in found), found
+    # 0.36, and 0.003 to 0.004 more in a cell of 500; sixteen have 0.3645, standard deviation 0.0023
+    assert np.mean([cell.last.rigid_porosity for cell in found]) == pytest.approx(0.3625, abs=0.005)
+    assert np.mean([cell.last.coordination for cell in found]) == pytest.approx(6.2, abs=0.3)
+    for cell in found:
+        assert cell.last.pressure == pytest.approx(88.0, rel=3e-3)
+        assert 0.0 < cell.last.rigid_porosity - cell.last.porosity < 0.004
+        assert cell.last.porosity == pytest.approx(1.0 - 500 * math.pi / 6.0 * (30 * UM / cell.length) ** 3)
+
+
+def test_friction_loosens() -> None:
+    smooth, rough = pressed(HALVES, x=10), pressed(HALVES, x=10, friction=0.3)
+    assert smooth.accepted and rough.accepted, (smooth.reasons, rough.reasons)
+    assert smooth.last.rigid_porosity == pytest.approx(0.319, abs=0.008)
+    assert rough.last.rigid_porosity == pytest.approx(0.418, abs=0.012)
+    assert smooth.last.coordination > 5.5 > 4.8 > rough.last.coordination > 3.8
+
+
+def test_porosity_follows_load_over_strength_alone() -> None:
+    heavy, light = pressed(HALVES, x=12, stress=300.0), pressed(HALVES, x=12, stress=60.0)
+    loose = pressed(HALVES, x=1, stress=25.0)
+    assert all(cell.accepted for cell in (heavy, light, loose))
+    assert heavy.last.overlap > 2.0 * light.last.overlap
+    assert heavy.last.rigid_porosity == pytest.approx(light.last.rigid_porosity, abs=0.006)
+    assert loose.last.rigid_porosity > light.last.rigid_porosity + 0.008
+
+
+def test_a_cell_is_led_from_stress_to_stress() -> None:
+    scene = scene_of(HALVES, 300, x=2, stress=20.0, friction=0.05)
+    found = press_along(scene, [20.0, 40.0, 80.0])
+    assert all(cell.accepted for cell in found), [cell.reasons for cell in found]
+    assert [round(cell.last.pressure / 20.0, 1) for cell in found] == [1.0, 2.0, 4.0]
+    porosity = [cell.last.rigid_porosity for cell in found]
+    assert porosity[0] > porosity[1] + 0.005 > porosity[2] + 0.010
+    assert found[2].steps < found[0].steps
+    (alone,) = press_along(replace(scene, patience=600), [20.0, 40.0])
+    assert not alone.accepted
+    with pytest.raises(CellError, match="stresses = "):
+        press_along(scene, [])
+    with pytest.raises(CellError, match="stress = 1000 Pa"):
+        press_along(scene, [20.0, 1000.0])
+
+
+def test_a_cell_that_explodes_says_so() -> None:
+    box = box_of(scene_of(particles=100))
+    box.velocity[0] = math.nan
+    with pytest.raises(EngineError, match="exploded"):
+        box.advance(500)
+
+
+def test_small_spheres_that_move_as_if_heavier_pack_alike_in_fewer_steps() -> None:
+    wide = ((10, 30), (0.15, 0.85))
+    plain, scaled = scene_of(wide), scene_of(wide, mass_scaling=True)
+    assert scaled.time_step > 1.5 * plain.time_step and (scaled.heaviness >= 1.0).all()
+    assert not (plain.heaviness > 1.0).any()
+    cell, other = pressed(wide), pressed(wide, mass_scaling=True)
+    assert cell.accepted and other.accepted
+    assert other.last.rigid_porosity == pytest.approx(cell.last.rigid_porosity, abs=0.008)
+
+
+def test_the_seed_decides_the_cell() -> None:
+    first, again, other = (press(scene_of(HALVES, 100, patience=3000, seed=seed)) for seed in (5, 5, 6))
+    assert np.array_equal(first.position, again.position) and first.length == again.length
+    assert not np.array_equal(first.position, other.position)
+
+
+def test_a_stress_that_is_not_reached_is_refused() -> None:
+    found = press(scene_of(particles=100, patience=1200))
+    assert not found.accepted and found.steps == 1200
+    assert any("Pa after 1,200 steps: must be within 0.003 of 88 Pa" in text for text in found.reasons)
+    assert any(text.startswith("porosity changed by") for text in found.reasons)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"stress": 800.0}, "stress = 800 Pa, 0.00031 of E* = 2.604e+06 Pa: must be at most 0.0003 of it, 781.2 Pa"),
+        ({"cohesion": 60e3}, "of E* = 2.604e+06 Pa: must be at most 1e-05 of it, 26.04 Pa"),
+        ({"stress": 0.0}, "stress = 0: must be a finite number above 0"),
+        ({"stress": math.nan}, "stress = nan: must be"),
+        ({"friction": -0.1}, "friction = -0.1: must be 0 to 10"),
+        ({"density": math.inf}, "density = inf: must be a finite number above 0"),
+        ({"void_fraction": 0.4}, "void_fraction = 0.4: must be 0.55 to 0.99"),
+        ({"patience": 0}, "patience = 0: must be 1 to 1e9"),
+    ],
+)
+def test_what_makes_no_cell_is_named(changed: dict[str, Any], said: str) -> None:
+    with pytest.raises(CellError) as caught:
+        scene_of(**changed)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("radius", [[1e-5], [1e-5, math.nan], [1e-5, -1e-5], [[1e-5, 1e-5]], [1e-5, 2e-5]])
+def test_radii_that_make_no_cell_are_refused(radius: list[Any]) -> None:
+    with pytest.raises(CellError, match="radius = "):
+        CellScene(radius=np.array(radius), stress=88.0, density=1180.0)
+
+
+def test_too_few_spheres_are_refused() -> None:
+    with pytest.raises(CellError, match="use more spheres than 2"):
+        press(scene_of(particles=2))
+    with pytest.raises(CellError, match="use more spheres than 20"):
+        press(scene_of(((5, 50), (0.01, 0.99)), 20))
+
+
+def test_a_periodic_cloud_knows_no_floor() -> None:
+    radius = np.full(300, 0.05)
+    side = (300 * math.pi / 6.0 * 1e-3 / 0.35) ** (1.0 / 3.0)
+    place = place_spheres(radius, side, side, 1, periodic=True)
+    assert not cKDTree(place, boxsize=side).query_pairs(0.1)
+    assert (np.abs(place[:, 2] - 0.5 * side) > 0.5 * side - 0.05).sum() > 20
+    with pytest.raises(CloudError, match="found no free place"):
+        place_spheres(np.full(10, 0.3), 0.7, 0.7, 1, periodic=True)
+
+
+CALM = Look(0, 88.0 * np.eye(3), 0.36, 0.362, 6.0, 1e-3, 1e-4)
+LOOKS = WINDOW_STEPS // CHECK_STEPS + 1
+
+
+def looks_of(change: Callable[[int], dict[str, Any]], count: int = LOOKS) -> list[Look]:
+    return [replace(CALM, step=k * CHECK_STEPS, force_ratio=1e-3 / (k + 1), **change(k)) for k in range(count)]
+
+
+def test_a_calm_cell_is_at_rest() -> None:
+    assert unrest(scene_of(), looks_of(lambda k: {})) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda k: {"stress": 88.3 * np.eye(3)}, "stress 88.3 Pa after 4,000 steps: must be within 0.003 of 88 Pa"),
+        (lambda k: {"stress": np.full((3, 3), math.nan)}, "stress nan Pa"),
+        (lambda k: {"porosity": 0.36 - 3e-6 * k}, "porosity changed by 2.4e-05 in the last 4,000 steps"),
+    ],
+)
+def test_unrest_is_named(change: Callable[[int], dict[str, Any]], said: str) -> None:
+    (found,) = unrest(scene_of(), looks_of(change))
+    assert said in found
+
+
+@pytest.mark.parametrize("ratios", [(0.02, 0.01), (1e-3, 2e-3)])
+def test_forces_must_be_balanced_and_falling(ratios: tuple[float, float]) -> None:
+    looks = looks_of(lambda k: {})
+    looks = [replace(look, force_ratio=ratios[look is looks[-1]]) for look in looks]
+    (found,) = unrest(scene_of(), looks)
+    assert found.startswith(f"mean net over mean contact force {ratios[1]:.2g}, {ratios[0]:.2g} 4,000 steps before")
+
+
+def test_a_short_calm_is_not_yet_rest() -> None:
+    (found,) = unrest(scene_of(), looks_of(lambda k: {}, LOOKS - 1))
+    assert "in the last 3,500 steps" in found
+
+
+def test_a_cell_at_rest_that_is_no_packing_is_refused() -> None:
+    scene = scene_of(particles=100)
+    inside = np.full((100, 3), 0.5)
+    assert refusals(scene, CALM, inside, 1.0) == []
+    (found,) = refusals(scene, CALM, inside[1:], 1.0)
+    assert "100 spheres were put in" in found
+    assert refusals(scene, CALM, np.full((100, 3), math.nan), 1.0)
+    assert refusals(scene, replace(CALM, stress=2.0 * LARGEST_LOAD * E_STAR * np.eye(3)), inside, 1.0)
+    sheared = CALM.stress.copy()
+    sheared[0, 1] = 1.1 * ANISOTROPY_LIMIT / 10.0 * 88.0
+    (found,) = refusals(scene, replace(CALM, stress=sheared), inside, 1.0)
+    assert found == "stress deviates by 0.66 of itself from an isotropic one: must be at most 0.6"
+
+
+def test_a_real_crystal_is_scaled() -> None:
+    strength = strength_of_adhesion(10e-3, 28.6 * UM)
+    found = similar(53e3, 3e9, strength=strength)
+    assert strength == pytest.approx(412.0, rel=1e-3)
+    assert found.stress == pytest.approx(88.3, rel=1e-3) and found.youngs_modulus == 5e6
+    assert found.load_over_strength == pytest.approx(128.6, rel=1e-3)
+    assert found.load_over_modulus == pytest.approx(found.stress / E_STAR)
+    simulated = contact_law.cohesive_strength(found.cohesion, found.youngs_modulus, 0.2)
+    assert found.stress / simulated == pytest.approx(found.load_over_strength)
+    scene_of(stress=found.stress, cohesion=found.cohesion)
+    bare = similar(53e3, 3e9)
+    assert bare.cohesion == 0.0 and bare.load_over_strength == math.inf
+
+
+def test_adhesion_is_the_pull_off_of_jkr() -> None:
+    pull_off = 1.5 * math.pi * 10e-3 * contact_law.effective_radius(10 * UM, 10 * UM)
+    assert strength_of_adhesion(10e-3, 20 * UM) == pytest.approx(pull_off / (20 * UM) ** 2)
+    # what SJKR holds with the same pull-off
+    cohesion = contact_law.cohesion_of_strength(strength_of_adhesion(10e-3, 20 * UM), E, NU)
+    assert contact_law.pull_off_force(cohesion, E, NU, 10 * UM, 10 * UM) == pytest.approx(pull_off)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            {"pressure": 53e3, "youngs_modulus": 0.1e9},
+            "stress = 5.3e+04 Pa, 0.001 of E* = 5.208e+07 Pa: must be at most",
+        ),
+        ({"pressure": 53e3, "youngs_modulus": 3e9, "strength": 2e4}, "strength = 2e+04 Pa, 1.3e-05 of E*"),
+        ({"pressure": -1.0, "youngs_modulus": 3e9}, "pressure = -1 Pa: must be a finite number above 0"),
+        ({"pressure": 1e4, "youngs_modulus": math.nan}, "youngs_modulus = nan Pa"),
+        ({"pressure": 1e4, "youngs_modulus": 3e9, "strength": -1.0}, "strength = -1 Pa"),
+        ({"pressure": 1e4, "youngs_modulus": 3e9, "poisson_ratio": 0.7}, "poisson_ratio = 0.7: must be 0 to 0.5"),
+    ],
+)
+def test_what_leaves_the_rigid_limit_is_refused(given: dict[str, float], said: str) -> None:
+    with pytest.raises(CellError) as caught:
+        similar(**given)
+    assert said in str(caught.value)
+
+
+def test_adhesions_and_diameters_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(CellError, match=r"adhesion = -1 J/m2"):
+        strength_of_adhesion(-1.0, 1e-5)
+    with pytest.raises(CellError, match=r"diameter = 0 m"):
+        strength_of_adhesion(1e-2, 0.0)
+    check_rigid(LARGEST_LOAD * E_STAR, LARGEST_STRENGTH * E_STAR, E_STAR)
