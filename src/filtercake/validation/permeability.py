@@ -133,7 +133,7 @@ def _second() -> list[Case]:
     found = []
     for number, (label, (mixture, options)) in enumerate(BEDS.items()):
         case = Case(f"second_{number}", SECOND, label, distribution={"mixture": mixture})
-        found.append(replace(case, options={"friction": 0, **options}, replicates=1))
+        found.append(replace(case, options={"friction": 0, **options}, replicates=1, accuracy=0.01))
     return found
 
 
