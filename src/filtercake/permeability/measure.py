@@ -236,8 +236,7 @@ def _settle(domain: Domain, flow: Flow, accuracy: float) -> Level:
     found = [slabs.permeability()]
     left = math.inf
     while not (flow.steps >= LEAST_STEPS and left < accuracy / 10.0):
-        if not domain.periodic:
-            _balance(flow, slabs.means()[1])
+        _balance(flow, slabs.means()[1])
         flow.run(CHUNK)
         found.append(slabs.permeability())
         if (not found[-1] > 0.0 and flow.steps >= LEAST_STEPS) or flow.steps >= MOST_STEPS:
@@ -347,7 +346,7 @@ class _Slabs:
         """Return the permeability of the slab, m2."""
         speed = self.flow.layers()[1]
         if self.domain.periodic:
-            gradient, velocity = 1.0, float(speed.mean())
+            gradient, velocity = float(self.flow.force.mean()), float(speed.mean())
         else:
             x = self.inside - self.inside.mean()
             gradient = float(np.sum(x * self.flow.potential()[self.inside]) / np.sum(x * x))
