@@ -78,7 +78,7 @@ def by_case(table: pd.DataFrame) -> pd.DataFrame:
         mean) and too_high (relative excess of eq. 3 with Carman's constant).
     """
     beds, cells = (spread(table, kind) for kind in MIXED)
-    spreads = {BED: beds, FINER: beds, CELL: cells, LAYERED: cells, LATTICE: Spread(0.0, math.inf)}
+    spreads = {BED: beds, FINER: beds, SECOND: beds, CELL: cells, LAYERED: cells, LATTICE: Spread(0.0, math.inf)}
     rows = []
     for (case, kind, label), packings in table.groupby(["case", "kind", "label"], sort=False):
         one = spreads[str(kind)]
