@@ -26,7 +26,7 @@ from filtercake.validation.permeability import (
     layered,
 )
 from filtercake.validation.permeability_page import FITS, PAGE, TABLE, render, write
-from filtercake.validation.resistance_law import by_case, fit_table
+from filtercake.validation.resistance_law import both_methods, by_case, finer, fit_table
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 DOCS = REPOSITORY / "docs"
@@ -139,7 +139,7 @@ def test_the_table_in_the_documentation_has_every_case(table: pd.DataFrame) -> N
     assert list(table.columns) == list(COLUMNS)
     counts = table.groupby("case", sort=False).size().to_dict()
     assert counts == {case.name: case.replicates for case in cases()}
-    assert set(table["kind"]) == {*MIXED, LAYERED, LATTICE, FINER}
+    assert set(table["kind"]) == {*MIXED, LAYERED, LATTICE, FINER, SECOND}
 
 
 def test_the_page_is_made_of_the_tables(table: pd.DataFrame) -> None:
@@ -154,9 +154,23 @@ def test_the_page_is_made_of_the_tables(table: pd.DataFrame) -> None:
 def test_everything_is_written(table: pd.DataFrame, tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     (tmp_path / "images").mkdir()
-    (tmp_path / "data" / "permeability_second_method.csv").write_text(
-        "bed,kozeny_constant\npmma_50_50,171.234\n", encoding="utf-8"
-    )
+    second = "permeability_second_method.csv"
+    other = pd.read_csv(DOCS / "data" / second)
+    other.assign(kozeny_constant=171.234).to_csv(tmp_path / "data" / second, index=False)
     write(table, TEMPLATE, tmp_path, tmp_path / "figure.pdf")
     assert (tmp_path / "images" / "permeability.png").stat().st_size > 10_000
-    assert "| pmma_50_50 | 171.2 |" in (tmp_path / PAGE).read_text(encoding="utf-8")
+    page = (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert page.count("| 171.2 +- ") == len(other) == 3
+
+
+def test_both_methods_agree(table: pd.DataFrame) -> None:
+    found = both_methods(table, pd.read_csv(DOCS / "data" / "permeability_second_method.csv"))
+    assert list(found["bed"]) == ["one size", "PMMA 50/50", "5:1"]
+    assert np.allclose(found["porosity"], found["other_porosity"], atol=5e-4)
+    assert (found["difference"].abs() < 0.03).all()
+
+
+def test_the_stated_error_covers_beds_on_fine_lattices(table: pd.DataFrame) -> None:
+    found = finer(table)
+    assert len(found) == 20 and found["covered"].sum() >= 18
+    assert (found["finer_nodes"] > 1.4 * found["nodes"]).all()
