@@ -10,7 +10,7 @@ import scipy
 from filtercake.packing.cloud import size_levels
 from filtercake.units import FloatArray, IntArray
 
-NODES = 48
+NODES = 96
 """Heights at which a lens is cut when a plane passes through it."""
 
 
