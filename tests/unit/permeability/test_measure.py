@@ -175,3 +175,28 @@ def test_spheres_of_a_slab_count_by_their_surface() -> None:
     spheres = Spheres(np.full((3, 3), 0.5), np.array([1.0, 1.0, 2.0]), np.full(3, 9.0))
     domain = Domain(spheres, measure.Slab(0.0, 9.0), 10, periodic=True)
     assert measure._effective_spheres(domain) == pytest.approx(36.0 / 18.0)
+
+
+def test_balancing_evens_the_flux_of_layers() -> None:
+    domain = bed_domain(*loose(1))
+    lattice = build(domain.spheres, domain.units * LEVELS[0])
+    heights = measure._heights(domain, lattice)
+    bed = ((heights > 0.0) & (heights < domain.slab.upper)).astype(np.float64)  # as if nothing were foretold
+    spread = []
+    for balanced in (True, False):
+        flow = Flow(lattice, bed)
+        while flow.steps < 500:
+            if balanced:
+                measure._balance(flow, 25.0 * UM)
+            flow.run(50)
+        flux = flow.layers()[2][measure._Slabs(domain, flow).inside]
+        spread.append(flux.std() / flux.mean())
+    assert spread[0] < 0.3 * spread[1]
+
+
+def test_the_porosity_counts_once_what_two_spheres_share() -> None:
+    radius, apart = 0.3, 0.4
+    position = np.array([[0.3, 0.5, 0.5], [0.3 + apart, 0.5, 0.5]])
+    found = measure_cell(position, np.full(2, radius), np.ones(3), accuracy=0.1)
+    lens = math.pi * (2.0 * radius - apart) ** 2 * (apart**2 + 4.0 * apart * radius) / (12.0 * apart)
+    assert found.porosity == pytest.approx(1.0 - (8.0 / 3.0 * math.pi * radius**3 - lens), rel=1e-9)

@@ -112,9 +112,11 @@ def test_overlapping_spheres_are_their_union() -> None:
     assert permeability(build(lone, 16), 200) == permeability(build(more, 16), 200)
 
 
-def test_walls_are_where_the_first_sphere_is() -> None:
-    lattice = build(Spheres(np.array([[4.6, 4.5, 4.5]]), np.array([2.0]), np.full(3, 9.0)), 9)
-    # node i lies at i + 0.5; along x, the sphere begins at 2.6: between nodes 2 (at 2.5) and 3
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_walls_are_where_the_first_sphere_is(order: list[int]) -> None:
+    # both cover node 3 of the row, at 3.5; along x, one begins at 2.6 and the other at 2.9
+    position, radius = np.array([[4.6, 4.5, 4.5], [4.4, 4.5, 4.5]]), np.array([2.0, 1.5])
+    lattice = build(Spheres(position[order], radius[order], np.full(3, 9.0)), 9)
     node = lattice.number[4, 4, 2]
     place = (node // 64) * 19 * 64 + 1 * 64 + node % 64
     assert lattice.number[4, 4, 3] == -1
