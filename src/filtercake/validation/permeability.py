@@ -170,6 +170,7 @@ def _wide() -> list[Case]:
     alum = {"kinetics": "ammonium_alum", "residence_time_min": 15, "slurry_concentration_kg_m3": 200}
     deep = {"cohesion_kJ_m3": 50, "friction": 0, "particles": 10_000, "bed_depth_factor": 2}
     few = {"cohesion_kJ_m3": 50, "friction": 0, "particles": 8000}
+    fuller, many = {**alum, "truncate_below_volume_fraction": 2e-4}, {**few, "particles": 12_000}
     tens = {"mixture": {10.0: 0.25, 100.0: 0.75}}
     return [
         _lognormal(0.2, 1500),
@@ -178,6 +179,8 @@ def _wide() -> list[Case]:
         _bed("binary_5", "1:5 50/50", {20.0: 0.5, 100.0: 0.5}, 6000),
         Case("alum", BED, "MSMPR, cut at 0.1 % a class", 3, 0.035, alum, few),
         Case("binary_10", BED, "1:10 25/75", 3, 0.04, tens, deep),
+        _lognormal(0.8, 8000, truncate_below_um=15, truncate_above_um=150),
+        Case("alum_fuller", BED, "MSMPR, cut at 0.02 % a class", 3, 0.04, fuller, many),
     ]
 
 
