@@ -290,16 +290,29 @@ def press_along(scene: CellScene, stresses: Sequence[float]) -> list[PressedCell
     CellError, CloudError, EngineError
         As :func:`press`; CellError for a stress that no cell can have.
     """
+    if not stresses:
+        raise CellError("stresses = (none): must be at least one")
+    return press_through([replace(scene, stress=stress) for stress in stresses])
+
+
+def press_through(stages: Sequence[CellScene]) -> list[PressedCell]:
+    """Lead one cell through scenes that differ in stress and cohesion only, to rest in each.
+
+    At rest only their ratio counts, so that a weaker cohesion under the same stress is a higher load.
+
+    Raises
+    ------
+    CellError, CloudError, EngineError
+        As :func:`press`.
+    """
     # who plans a study need not wait for the compiler
     from filtercake.packing.cell_box import CellBox
 
-    if not stresses:
-        raise CellError("stresses = (none): must be at least one")
-    scenes = [replace(scene, stress=stress) for stress in stresses]
+    scene = stages[0]
     side = (scene.solids / (1.0 - scene.void_fraction)) ** (1.0 / 3.0)
-    box = CellBox(scenes[0], place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
+    box = CellBox(scene, place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
     found: list[PressedCell] = []
-    for stage in scenes:
+    for stage in stages:
         box.lead_to(stage)
         found.append(_rest(box))
         if not found[-1].accepted:

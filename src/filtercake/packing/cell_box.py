@@ -55,7 +55,6 @@ class CellBox:
         self.smallest = 2.0 * float(scene.radius.min())
         self.widest = 2.0 * float(scene.radius.max())
         self.box = np.array([length, 0.0])
-        self.law = _law(scene)
         self.kernel = cell_kernels.make_advance(scene.cohesion > 0.0, self.frictional)
         self.averages = cell_kernels.make_measure(scene.cohesion > 0.0, self.frictional)
         self.find_pairs = kernels.make_find_pairs(False)
@@ -67,8 +66,11 @@ class CellBox:
         self._list_pairs()
 
     def lead_to(self, scene: CellScene) -> None:
-        """Go on to the stress of another scene that differs in nothing else; drag and servo follow from it."""
-        self.scene = scene
+        """Go on to the stress and the cohesion of another scene that differs in nothing else.
+
+        Drag and servo follow from the stress. What starts without cohesion has none later.
+        """
+        self.scene, self.law = scene, _law(scene)
         self.servo = cell_kernels.Servo(scene.stress, scene.servo * scene.rate / 3.0)
         self.drag[:] = (scene.drag * scene.rate / scene.heaviness)[self.identity]
 
