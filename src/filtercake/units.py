@@ -19,6 +19,8 @@ LITRE: Final = 1e-3
 KILOJOULE_PER_M3: Final = 1e3
 MEGAPASCAL: Final = 1e6
 KILOPASCAL: Final = 1e3
+GIGAPASCAL: Final = 1e9
+MILLIJOULE_PER_M2: Final = 1e-3
 MILLIPASCAL_SECOND: Final = 1e-3
 GRAVITY: Final = 9.81
 """Gravitational acceleration, m/s2 (physical constant used by the paper's script)."""

@@ -23,6 +23,7 @@ from filtercake.study.loading import (
     with_names_as_written,
 )
 from filtercake.study.points import expand as expand_points
+from filtercake.study.points import packed
 from filtercake.units import MICROMETRE, MINUTE
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
@@ -100,14 +101,20 @@ def study_of(wildcards):
     return KNOWN[wildcards.study]
 
 
-def point_of(wildcards):
-    return KNOWN_POINTS[wildcards.study][wildcards.point]
+@cache
+def packings_of(study):
+    """What is packed for a study, by name: pressed cakes serve several points."""
+    return packed(KNOWN_POINTS[study].values())
+
+
+def packed_of(wildcards):
+    return packings_of(wildcards.study)[wildcards.point]
 
 
 def manifests(wildcards):
     return [
-        f"{RESULTS}/{wildcards.study}/packings/{point}/{MANIFEST}"
-        for point in KNOWN_POINTS[wildcards.study]
+        f"{RESULTS}/{wildcards.study}/packings/{name}/{MANIFEST}"
+        for name in packings_of(wildcards.study)
     ]
 
 
@@ -185,7 +192,7 @@ def partition():
 
 def flow_memory_mb(wildcards):
     accuracy = study_of(wildcards).model.permeability.accuracy
-    return estimate.flow_memory_mb(point_of(wildcards).scene, accuracy)
+    return estimate.flow_memory_mb(packed_of(wildcards).scene, accuracy)
 
 
 def solved_flows(wildcards):
@@ -193,8 +200,8 @@ def solved_flows(wildcards):
     if study_of(wildcards).model.permeability is None:
         return []
     return [
-        f"{RESULTS}/{wildcards.study}/permeability/{point}/permeability.json"
-        for point in KNOWN_POINTS[wildcards.study]
+        f"{RESULTS}/{wildcards.study}/permeability/{name}/permeability.json"
+        for name in packings_of(wildcards.study)
     ]
 
 
@@ -207,7 +214,7 @@ def granted_minutes():
 def packing_minutes(wildcards, attempt):
     """Walltime from measured run times; doubled on every retry, within what is granted."""
     return estimate.walltime_minutes(
-        point_of(wildcards), attempt, granted=granted_minutes()
+        packed_of(wildcards), attempt, granted=granted_minutes()
     )
 
 
@@ -220,7 +227,7 @@ def figure_minutes(wildcards):
 
 def packing_group(wildcards):
     """Name of the submissions that short points share on a cluster; the profile says how many."""
-    size = estimate.group_size(point_of(wildcards), granted=granted_minutes())
+    size = estimate.group_size(packed_of(wildcards), granted=granted_minutes())
     return f"packing_{size}" if size > 1 else None
 
 
@@ -229,7 +236,7 @@ def points_of_run():
     found = {}
     for job in workflow.dag.jobs:
         if job.rule.name == "packing":
-            point = point_of(job.wildcards)
+            point = packed_of(job.wildcards)
             found.setdefault(job.wildcards.study, {})[point.name] = point
     return found
 
@@ -239,7 +246,7 @@ def points_to_make():
     found = {}
     for job in workflow.dag.needrun_jobs(exclude_finished=False):
         if job.rule.name == "packing":
-            point = point_of(job.wildcards)
+            point = packed_of(job.wildcards)
             found.setdefault(job.wildcards.study, {})[point.name] = point
     return found
 

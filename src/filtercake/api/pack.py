@@ -97,12 +97,13 @@ def pack(
     path, name = Path(folder), csd_name(study)
     _check_folder(path)
     point = base_point(study, name, engine_choice.choose)
+    made = point.scene.as_packed()
     csd = study.csds[name]
     # a resistance beyond floating point is found before the packings are made, not after
     sphericity = study.model.material.sphericity
     resistance(source, porosity=0.01, density_kg_m3=point.scene.density, sphericity=sphericity, law=law)
     if not replace:
-        _check_packings(path, point_key(packing_code(point.scene.engine), point.scene))
+        _check_packings(path, point_key(packing_code(made.engine), made))
     outcomes = _make(point, path, say)
     rows = list(replicate_rows(point, outcomes, path, (csd.full, csd.truncated), sphericity, law))
     table = pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
@@ -124,11 +125,12 @@ def _make(point: Point, folder: Path, say: Report) -> list[Outcome]:
         else:
             say(f"r{outcome.replicate} failed: {outcome.reason}")
 
+    made = point.scene.as_packed()
     interval, code = point.porosity_ci95_target, packing_code(point.scene.engine)
     enough: Callable[[Path], bool] = lambda _: False  # noqa: E731 - the other branch is an object
     if interval is not None:
-        enough = UntilNarrow(point.scene, interval, point.replicates)
-    return pack_replicates(point.scene, point.most_replicates, folder, code, report, say, enough)
+        enough = UntilNarrow(made, interval, point.replicates)
+    return pack_replicates(made, point.most_replicates, folder, code, report, say, enough)
 
 
 def _summary(table: pd.DataFrame, point: Point) -> dict[str, Any]:

@@ -24,6 +24,8 @@ NARROW_PARTICLES = 2000
 """Spheres in a bed of a narrow distribution (paper, Table 3)."""
 WIDTH_DIAMETERS, DEPTH_DIAMETERS = 4.6, 10.0
 """Width of the box and depth of the settled bed of a broad distribution, in largest diameters."""
+CELL_DIAMETERS = 3.3
+"""Side of a pressed cell of a broad distribution, in largest diameters."""
 SETTLED_POROSITY = 0.3
 """Rough porosity of such a bed, for its depth only."""
 
@@ -120,6 +122,15 @@ def bed_for(csd: CrystalSizeDistribution, void_fraction: float) -> BedSize:
     solids = width**2 * depth * (1.0 - SETTLED_POROSITY)
     bed_depth_factor = depth * (1.0 - SETTLED_POROSITY) / ((1.0 - void_fraction) * PLACEMENT_HEIGHT * width)
     return BedSize(max(NARROW_PARTICLES, math.ceil(solids / csd.mean_particle_volume)), round(bed_depth_factor, 3))
+
+
+def cell_for(csd: CrystalSizeDistribution) -> int:
+    """Choose how many spheres a pressed cell of a (truncated) distribution has: 2000, or enough for its width.
+
+    Without floor and surface it need only be wide enough that its largest spheres are not neighbours of themselves.
+    """
+    wanted = (1.0 - SETTLED_POROSITY) * (CELL_DIAMETERS * csd.largest) ** 3 / csd.mean_particle_volume
+    return max(NARROW_PARTICLES, math.ceil(wanted / 100.0) * 100)
 
 
 def make_cloud(

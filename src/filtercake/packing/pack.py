@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
+from filtercake.errors import CellError, CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
 from filtercake.packing.cloud import Cloud, make_cloud
+from filtercake.packing.compression import press_cake
 from filtercake.packing.engines import Engine, SettleRequest, get_engine
 from filtercake.packing.result import Packing, SettledState, read_sealed, sealed, sha256, write_json
 from filtercake.packing.scene import Scene, digest, stage_seed
@@ -97,6 +98,8 @@ def pack(
     CloudError, EngineError, PackingRejected
         If the spheres cannot be placed, the engine fails, or its result is not acceptable.
     """
+    if scene.is_pressed:
+        return press_cake(scene, replicate, cloud_seed(scene, replicate), progress)
     settled = settle(scene, replicate, folder, engine=engine, progress=progress, state_file=state_file)
     state = settled.state
     diagnostics = {
@@ -269,7 +272,7 @@ def _attempt(
             made = pack(scene, replicate, scratch, engine=engine, progress=progress, state_file=state_file)
         except EngineMissing:
             raise
-        except (CloudError, EngineError, PackingRejected) as error:
+        except (CellError, CloudError, EngineError, PackingRejected) as error:
             if getattr(error, "transient", False) and attempt < ATTEMPTS:
                 progress(f"replicate {replicate}: {error}; trying again")
                 continue

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import math
+
 import numpy as np
 
 from filtercake.packing import contact_law
+from filtercake.packing.compression import CompressionCurve
 from filtercake.packing.contacts import find_contacts, lens_volume_below
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
@@ -98,7 +101,14 @@ def porosity_profile(position: FloatArray, radius: FloatArray, length: float, ed
 
 
 def measure(packing: Packing, scene: Scene) -> PorosityResult:
-    """Measure all porosities of an accepted packing."""
+    """Measure all porosities of an accepted packing.
+
+    A pressed one has neither floor nor surface: its porosity is that of the whole cell, corrected to rigid spheres, at
+    the last load; the paper's count and the slab at the floor do not exist (nan).
+    """
+    if scene.is_pressed:
+        porosity = float(CompressionCurve.of(packing.diagnostics).porosity[-1])
+        return PorosityResult(porosity, math.nan, math.nan, 0.0, Slab(0.0, packing.length))
     position, radius, length = packing.position, packing.radius, packing.length
     slab = interior_slab(position, radius)
     interior = slab_porosity(position, radius, length, slab)

@@ -15,11 +15,17 @@ from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import shown
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import NARROW, PLACEMENT_HEIGHT, box_length
+from filtercake.packing.similarity import SIMULATED_MODULUS, strength_of_adhesion
 from filtercake.units import GRAVITY
 
 SPREAD: Final = 0.0026
 """Standard deviation of one packing's porosity at ``SPREAD_PARTICLES`` spheres."""
 SPREAD_PARTICLES: Final = 2000
+GRAVITY_PROTOCOL, FILTRATION_PROTOCOL = "gravity", "filtration"
+"""Spheres that fall onto a floor, as in the paper; a cake pressed as in a filter (:mod:`filtercake.packing.cell`)."""
+PROTOCOLS: Final = (GRAVITY_PROTOCOL, FILTRATION_PROTOCOL)
+OF_FILTRATION: Final = ("protocol", "pressure", "adhesion", "crystal_modulus")
+"""What only pressed cakes have: it is not named where nothing is pressed."""
 INCIDENTAL: Final = ("processes", "time_limit", "write_vtk")
 """What does not decide a packing: it stands whatever these become."""
 _KINDS: Final = {"int": (int,), "float": (int, float), "str": (str,), "bool": (bool,)}
@@ -67,6 +73,14 @@ class Scene:
         Wall-clock limit of one packing, s; 0 for none.
     write_vtk : bool
         Whether to keep pictures of the settling for ParaView.
+    protocol : {"gravity", "filtration"}
+        Whether the spheres fall, or are pressed.
+    pressure : float
+        Real pressure drop across a pressed cake, Pa.
+    adhesion : float
+        Real work of adhesion of pressed crystals, J/m2; 0 where ``cohesion`` says how they stick.
+    crystal_modulus : float
+        Young's modulus of real crystals under that pressure, Pa; those that are simulated have ``youngs_modulus``.
     """
 
     csd: CrystalSizeDistribution
@@ -89,6 +103,10 @@ class Scene:
     processes: int = 0
     time_limit: float = 0.0
     write_vtk: bool = False
+    protocol: str = GRAVITY_PROTOCOL
+    pressure: float = 0.0
+    adhesion: float = 0.0
+    crystal_modulus: float = 0.0
 
     def __eq__(self, other: object) -> bool:
         """Whether both make the same packings."""
@@ -123,7 +141,8 @@ class Scene:
 
     def decisive(self) -> dict[str, Any]:
         """Return all that decides the packing, as plain values: the point's name, key and reruns follow from it."""
-        numbers = {name: value for name, value in vars(self).items() if name not in ("csd", *INCIDENTAL)}
+        left_out = ("csd", *INCIDENTAL, *(() if self.is_pressed else OF_FILTRATION))
+        numbers = {name: value for name, value in vars(self).items() if name not in left_out}
         return {**numbers, "size": self.csd.size.tolist(), "volume_fraction": self.csd.volume_fraction.tolist()}
 
     def incidental(self) -> dict[str, Any]:
@@ -133,6 +152,52 @@ class Scene:
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain values."""
         return {**self.decisive(), **self.incidental()}
+
+    def as_packed(self) -> Scene:
+        """Return the scene whose packings serve this one.
+
+        One pressed cell is led through all loads, so that only the kind of attraction counts for it, not how strong it
+        is or how high the pressure (:mod:`filtercake.packing.compression`).
+        """
+        if not self.is_pressed:
+            return self
+        kind = self.attraction
+        one = replace(
+            self,
+            youngs_modulus=SIMULATED_MODULUS,
+            cohesion=float(kind == "cohesion"),
+            adhesion=float(kind == "adhesion"),
+            pressure=1.0,
+            crystal_modulus=1.0,
+            bed_depth_factor=1.0,
+            settling_velocity=0.0,
+            skin=0.0,
+        )
+        return one.with_time_step(self.rayleigh_fraction)
+
+    @property
+    def is_pressed(self) -> bool:
+        """Whether the packing is a cake pressed as in a filter."""
+        return self.protocol == FILTRATION_PROTOCOL
+
+    @property
+    def attraction(self) -> str:
+        """How the crystals stick: ``none``, ``cohesion`` (SJKR) or ``adhesion`` (size-true pull-off)."""
+        if self.adhesion > 0.0:
+            return "adhesion"
+        return "cohesion" if self.cohesion > 0.0 else "none"
+
+    @property
+    def strength(self) -> float:
+        """Stress that the real contacts hold, p_c, Pa: of two crystals as large as the Sauter mean."""
+        if self.attraction == "adhesion":
+            return strength_of_adhesion(self.adhesion, self.csd.sauter_mean)
+        return contact_law.cohesive_strength(self.cohesion, self.youngs_modulus, self.poisson_ratio)
+
+    @property
+    def load_over_strength(self) -> float:
+        """Pressure over what the contacts hold, x = p/p_c; infinite without attraction."""
+        return self.pressure / self.strength if self.strength > 0.0 else math.inf
 
     @property
     def rayleigh_time_step(self) -> float:

@@ -14,8 +14,8 @@ from filtercake.errors import PackingRejected
 from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.result import Packing, publish, read_record, read_sealed, sealed, sha256, write_json
-from filtercake.packing.scene import digest
-from filtercake.permeability.measure import bed_domain, solve
+from filtercake.packing.scene import FILTRATION_PROTOCOL, digest
+from filtercake.permeability.measure import bed_domain, cell_domain, solve
 from filtercake.permeability.result import Permeability, Picture
 
 RECORD: Final = "permeability.json"
@@ -59,8 +59,9 @@ def solve_replicates(
         picture = folder / PICTURE if not rows else None
         row = _kept(folder / f"r{outcome.replicate}.json", key, picture)
         if row is None:
+            domain = cell_domain if packing.diagnostics.get("protocol") == FILTRATION_PROTOCOL else bed_domain
             found, cut = solve(
-                bed_domain(packing.position, packing.radius, packing.length, accuracy),
+                domain(packing.position, packing.radius, packing.length, accuracy),
                 accuracy,
                 say=lambda line, who=outcome.replicate: note(f"r{who} {line}"),  # type: ignore[misc]
                 picture=picture is not None,

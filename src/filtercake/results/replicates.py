@@ -11,7 +11,9 @@ import pandas as pd
 
 from filtercake.crystals.csd import FullAndTruncated
 from filtercake.errors import PackingRejected
+from filtercake.filtration.compressible import CakeAverage, cake_average
 from filtercake.filtration.resistance import ADDITIVE
+from filtercake.packing.compression import CompressionCurve
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, read_record
@@ -25,9 +27,13 @@ Solved = Mapping[int, Mapping[str, Any]]
 """What the flow through packings was found to be, by replicate."""
 NOTHING_SOLVED: Solved = {}
 
+PRESSED = ("porosity_at_medium", "compressibility", "load_over_strength")
+"""Of pressed cakes: porosity under the whole pressure drop, exponent n of the average resistance, and x = p/p_c."""
+
 MEASURED = (
     "porosity",
     "porosity_paper_count",
+    *PRESSED[:2],
     *RESISTANCES,
 )
 
@@ -45,6 +51,7 @@ REPLICATE_COLUMNS = (
     LAW,
     LAW_CI95,
     *FLOW,
+    PRESSED[2],
     "porosity_from_floor",
     "soft_contact_compaction",
     "pull_off_over_weight",
@@ -65,6 +72,11 @@ SUMMARY_COLUMNS = (
     "porosity_ci95",
     "porosity_paper_count",
     "porosity_paper_count_ci95",
+    "porosity_at_medium",
+    "porosity_at_medium_ci95",
+    "compressibility",
+    "compressibility_ci95",
+    "load_over_strength",
     "resistance_m_kg",
     "resistance_ci95_m_kg",
     LAW,
@@ -100,9 +112,12 @@ def replicate_row(
 ) -> dict[str, Any]:
     """Measure an accepted packing: one row of ``REPLICATE_COLUMNS``.
 
-    The resistance is that of the full distribution; that of the truncated one is kept for comparison.
+    The resistance is that of the full distribution; that of the truncated one is kept for comparison. Of a pressed
+    cake, porosity and resistance are averages from its surface to the medium.
     """
     found, record = measure(packing, point.scene), packing.diagnostics
+    pressed = _pressed(point, record)
+    porosity = found.interior if pressed is None else pressed.porosity
     return {
         **point.row(),
         "replicate": record["replicate"],
@@ -110,13 +125,14 @@ def replicate_row(
         "status": "ok",
         "reason": "",
         "settled": record["settled"],
-        "porosity": found.interior,
+        "porosity": porosity,
         "porosity_paper_count": found.paper_count,
-        **resistance_columns(law, found.interior, csd, point.scene.density, sphericity, constant_of(flows.values())),
+        **_pressed_columns(point, pressed),
+        **resistance_columns(law, porosity, csd, point.scene.density, sphericity, constant_of(flows.values())),
         **_flow(flows.get(record["replicate"])),
         "porosity_from_floor": found.from_floor,
         "soft_contact_compaction": found.compaction,
-        "pull_off_over_weight": point.scene.pull_off_over_weight,
+        "pull_off_over_weight": np.nan if point.scene.is_pressed else point.scene.pull_off_over_weight,
         "overlap_max": record["overlap_max"],
         "coordination": record["coordination"],
         "particles": record["particles"],
@@ -165,9 +181,9 @@ def replicates_table(
     """
     rows: list[dict[str, Any]] = []
     for point in points:
-        folder = packings / point.name
+        folder = packings / point.packings
         outcomes = [Outcome(**entry) for entry in read_record(folder / MANIFEST)["replicates"]]
-        flows = NOTHING_SOLVED if solved is None else read_solved(solved / point.name / RECORD)
+        flows = NOTHING_SOLVED if solved is None else read_solved(solved / point.packings / RECORD)
         rows += replicate_rows(point, outcomes, folder, csds[point.csd], sphericity, law, flows)
     return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
 
@@ -188,12 +204,26 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
             row[_interval_name(column)] = half_width(values)
         row["interval_reached"] = _reached(row["porosity_ci95"], row["porosity_ci95_target"])
         row[LAW] = group.iloc[0][LAW]
-        for column in (LAW_CI95, "soft_contact_compaction", "pull_off_over_weight"):
+        for column in (LAW_CI95, "load_over_strength", "soft_contact_compaction", "pull_off_over_weight"):
             row[column] = good[column].mean()
         row.update(_mean_flow(good))
         row["overlap_max"] = good["overlap_max"].max()
         rows.append(row)
     return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
+
+
+def _pressed(point: Point, record: Mapping[str, Any]) -> CakeAverage | None:
+    """Average a pressed cake; None for one that was not pressed."""
+    if not point.scene.is_pressed:
+        return None
+    return cake_average(point.scene.load_over_strength, CompressionCurve.of(record).at)
+
+
+def _pressed_columns(point: Point, cake: CakeAverage | None) -> dict[str, Any]:
+    """Give the columns ``PRESSED``; blank where nothing was pressed."""
+    if cake is None:
+        return dict.fromkeys(PRESSED, np.nan)
+    return dict(zip(PRESSED, (cake.porosity_at_medium, cake.exponent, point.scene.load_over_strength), strict=True))
 
 
 def _flow(found: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -36,6 +36,14 @@ FALLS: Final = {
 WIDE_FALLS: Final = 1.15
 """Factor on it for a wide distribution, whose bed swings for longer."""
 
+PRESSED_STEPS: Final = {
+    (False, False): 30_000.0,
+    (False, True): 190_000.0,
+    (True, False): 70_000.0,
+    (True, True): 250_000.0,
+}
+"""Time steps of a pressed cell, by whether there is friction, and attraction: then it is led through all loads."""
+
 SPHERES: Final = 8000
 """Number of spheres that the engines' times per sphere and step are for."""
 GROWTH: Final = 0.1
@@ -113,6 +121,8 @@ class Estimate:
 
 def fall_steps(scene: Scene) -> float:
     """Return the time steps that a packing is expected to take."""
+    if scene.is_pressed:
+        return PRESSED_STEPS[scene.friction > 0.0, scene.attraction != "none"]
     steps = ENGINES[scene.engine].fixed_steps
     if steps:
         return steps

@@ -16,11 +16,13 @@ import numpy as np
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing import contact_law
+from filtercake.packing.compression import LEAST_LOAD
 from filtercake.packing.engines import kind_of
 from filtercake.packing.representation import Representation, particles_for, represent
 from filtercake.packing.scene import Scene
+from filtercake.packing.similarity import LARGEST_LOAD, LARGEST_STRENGTH
 from filtercake.packing.slab import LEAST_BED_DIAMETERS
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, MICROMETRE, MICROSECOND
+from filtercake.units import GIGAPASCAL, KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, MICROMETRE, MICROSECOND
 
 PAGE: Final = "docs/stability.md"
 
@@ -57,6 +59,10 @@ IDLE_LOAD_SHARE: Final = 0.1
 """Cohesive strength over the bed's own load under which cohesion changes nothing that can be seen: warned."""
 LIGHTEST_SOLID: Final = 300.0
 """Density, kg/m3, under that of any solid that is filtered: another unit is meant."""
+NARROWEST_CELL: Final = 2.1
+"""Side of a pressed cell in largest diameters under which spheres are neighbours of themselves: refused."""
+LEAST_PRESSED_RESTITUTION: Final = 0.2
+"""Restitution under which pressed cells with friction are kept moving by their time step: refused."""
 SMALLEST_POROSITY, LARGEST_POROSITY = 0.15, 0.85
 """Porosities beyond which a measured resistance is in another unit than it says, or something of it is."""
 FINEST, COARSEST = 0.5e-6, 20e-3
@@ -73,7 +79,7 @@ class Finding:
 
     Attributes
     ----------
-    key : {"cohesion", "time_step", "density", "restitution", "sizes", "particles"}
+    key : {"cohesion", "adhesion", "pressure", "time_step", "density", "restitution", "sizes", "particles"}
         Which number it is about.
     text : str
         What is wrong, with the number that is allowed and the page that shows why.
@@ -90,6 +96,9 @@ def default_time_step(friction: float) -> float:
 
 def refusals(scene: Scene) -> Iterator[Finding]:
     """Say what is proven unstable about a scene."""
+    if scene.is_pressed:
+        yield from _pressed_refusals(scene)
+        return
     rayleigh = scene.rayleigh_time_step
     if scene.relative_overlap > LARGEST_RELATIVE_OVERLAP:
         limit = contact_law.cohesion_at_overlap(LARGEST_RELATIVE_OVERLAP, scene.youngs_modulus, scene.poisson_ratio)
@@ -123,14 +132,10 @@ def refusals(scene: Scene) -> Iterator[Finding]:
 
 def small_beds(scene: Scene) -> Iterator[Finding]:
     """Say whether a bed is too small for its distribution: too shallow to measure, or short of whole classes."""
-    needed = LEAST_BED_DIAMETERS * scene.csd.largest
-    deepest = scene.particles * scene.csd.mean_particle_volume / scene.box_length**2 / (1.0 - LOOSEST)
-    if deepest < needed:
-        yield Finding(
-            "particles",
-            f"a bed at most {deepest / MICROMETRE:.4g} um deep, less than the {needed / MICROMETRE:.4g} um of "
-            f"{LEAST_BED_DIAMETERS:g} of its largest spheres; use more particles, or a larger bed_depth_factor",
-        )
+    if scene.is_pressed:
+        yield from _narrow_cells(scene)
+    else:
+        yield from _shallow_beds(scene)
     if kind_of(scene.engine).own_spheres:
         return
     found, largest = representation(scene), SHIFT_SPREADS * scene.expected_spread
@@ -143,6 +148,31 @@ def small_beds(scene: Scene) -> Iterator[Finding]:
             "particles",
             f"{found.words}; the porosity would be off by about {found.porosity_shift:+.3f}, more than its interval "
             f"could tell: {cure}",
+        )
+
+
+def _narrow_cells(scene: Scene) -> Iterator[Finding]:
+    """Say whether a pressed cell, at its densest, is too narrow for its largest sphere."""
+    solids = scene.particles * scene.csd.mean_particle_volume
+    side = (solids / (1.0 - SMALLEST_POROSITY)) ** (1.0 / 3.0)
+    needed = NARROWEST_CELL * scene.csd.largest
+    if side < needed:
+        yield Finding(
+            "particles",
+            f"a cell of {side / MICROMETRE:.4g} um, less than the {needed / MICROMETRE:.4g} um of {NARROWEST_CELL:g} "
+            f"of its largest spheres; use at least {math.ceil(scene.particles * (needed / side) ** 3):,} particles",
+        )
+
+
+def _shallow_beds(scene: Scene) -> Iterator[Finding]:
+    """Say whether a settled bed is too shallow to be measured."""
+    needed = LEAST_BED_DIAMETERS * scene.csd.largest
+    deepest = scene.particles * scene.csd.mean_particle_volume / scene.box_length**2 / (1.0 - LOOSEST)
+    if deepest < needed:
+        yield Finding(
+            "particles",
+            f"a bed at most {deepest / MICROMETRE:.4g} um deep, less than the {needed / MICROMETRE:.4g} um of "
+            f"{LEAST_BED_DIAMETERS:g} of its largest spheres; use more particles, or a larger bed_depth_factor",
         )
 
 
@@ -191,6 +221,44 @@ def unit_problems(csd: CrystalSizeDistribution, density: float) -> Iterator[Find
         yield Finding("sizes", f"{shown}: {why}{likely}")
 
 
+def _pressed_refusals(scene: Scene) -> Iterator[Finding]:
+    """Say what a pressed cake is not known for: contacts that are not rigid, loads that decide nothing."""
+    modulus = contact_law.effective_modulus(scene.crystal_modulus, scene.poisson_ratio)
+    sticks = "adhesion" if scene.attraction == "adhesion" else "cohesion"
+    given = f"E = {scene.crystal_modulus / GIGAPASCAL:g} GPa (material.youngs_modulus_GPa)"
+    if scene.pressure > LARGEST_LOAD * modulus:
+        yield Finding(
+            "pressure",
+            f"must be at most {LARGEST_LOAD * modulus / KILOPASCAL:.3g} kPa at {given}: above {LARGEST_LOAD:g} of E*, "
+            "crystals are pressed out of shape",
+        )
+    if scene.strength > LARGEST_STRENGTH * modulus:
+        yield Finding(
+            sticks,
+            f"holds {scene.strength / KILOPASCAL:.3g} kPa; must hold at most "
+            f"{LARGEST_STRENGTH * modulus / KILOPASCAL:.3g} kPa at {given}: above {LARGEST_STRENGTH:g} of E*, contacts "
+            "are pulled out of shape",
+        )
+    if scene.load_over_strength < LEAST_LOAD:
+        yield Finding(
+            sticks,
+            f"holds {scene.strength / KILOPASCAL:.3g} kPa, more than the pressure of {scene.pressure / KILOPASCAL:.3g} "
+            "kPa: the cake is what the way it formed has made of it; use more pressure or less attraction",
+        )
+    if scene.time_step > (SOFT_TIME_STEP + 1e-9) * scene.rayleigh_time_step:
+        yield Finding("time_step", f"must be at most {SOFT_TIME_STEP:g} of the Rayleigh time step in a pressed cell")
+    elif scene.friction > 0.0:
+        yield from _long_steps(scene)
+    if scene.density > LARGEST_DENSITY:
+        yield Finding("density", f"must be at most {LARGEST_DENSITY:g} kg/m3 ({PAGE})")
+    if scene.friction > 0.0 and scene.restitution < LEAST_PRESSED_RESTITUTION:
+        yield Finding(
+            "restitution",
+            f"must be at least {LEAST_PRESSED_RESTITUTION:g} in a pressed cell with friction: one damped harder shakes "
+            "itself and never comes to rest",
+        )
+
+
 def _long_steps(scene: Scene) -> Iterator[Finding]:
     """Say which time steps under the Rayleigh step are still too long for a scene."""
     rayleigh, overlap = scene.rayleigh_time_step, scene.relative_overlap
@@ -217,6 +285,8 @@ def _long_steps(scene: Scene) -> Iterator[Finding]:
 
 def doubts(scene: Scene) -> Iterator[Finding]:
     """Say what is allowed about a scene, but makes its porosity depend on a choice of numbers."""
+    if scene.is_pressed:
+        return
     overlap = scene.relative_overlap
     if DOUBTFUL_RELATIVE_OVERLAP < overlap <= LARGEST_RELATIVE_OVERLAP:
         yield Finding(

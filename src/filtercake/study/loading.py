@@ -16,13 +16,14 @@ from filtercake.crystals.csd import CrystalSizeDistribution, read_csd, truncate
 from filtercake.crystals.size_laws import made
 from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
 from filtercake.filtration.resistance import RESISTANCE_LAWS, law_of
-from filtercake.packing.cloud import bed_for
-from filtercake.packing.scene import Scene
+from filtercake.packing.cloud import bed_for, cell_for
+from filtercake.packing.engines.embedded import Embedded
+from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene
 from filtercake.study import limits
 from filtercake.study.config.crystals import Crystallizer, Csd
-from filtercake.study.config.packing import Packing
+from filtercake.study.config.packing import AUTO, Packing
 from filtercake.study.config.study import MOST_DISTRIBUTIONS, Study, Workflow
-from filtercake.study.config.sweep import SWEPT
+from filtercake.study.config.sweep import OF_FILTRATION, SWEPT
 from filtercake.study.config.values import MOST_PARTICLES, MOST_POINTS, NAME
 from filtercake.study.products import resolve, slurry_problems
 from filtercake.study.scenes import scene_of
@@ -213,6 +214,9 @@ def check_study(values: Any, path: Path, *, packed: bool = True) -> LoadedStudy:
         raise ConfigError(problems)
     problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
     problems += _law_problems(model, str(path))
+    problems += dict.fromkeys(_protocol_problems(model, str(path)))
+    if problems:  # a scene needs a pressure
+        raise ConfigError(problems)
     csds: dict[str, LoadedCsd] = {}
     for name, csd in model.csds.items():
         try:
@@ -347,7 +351,7 @@ def _load_csd(
 def _size_problems(model: Study, file: str) -> Iterable[Problem]:
     """Studies with more points or distributions than can be handled."""
     points = sum(
-        len(sweep.csd or []) * math.prod(len(getattr(sweep, name) or [0]) for name in SWEPT) for sweep in model.sweeps
+        len(sweep.csd or []) * len(sweep.protocol or [0]) * math.prod(len(getattr(sweep, name) or [0]) for name in SWEPT) for sweep in model.sweeps
     )
     if points > MOST_POINTS:
         yield Problem(file, "sweeps", f"{points} points", f"must be at most {MOST_POINTS} points; make several studies")
@@ -361,10 +365,16 @@ def _bed_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterab
     if model.packing.particles is not None:
         return
     for name in dict.fromkeys(name for sweep in model.sweeps for name in sweep.csd or [] if name in csds):
-        needed = bed_for(csds[name].truncated, model.packing.initial_void_fraction).particles
+        truncated = csds[name].truncated
+        needed = max(
+            cell_for(truncated)
+            if protocol == FILTRATION_PROTOCOL
+            else bed_for(truncated, model.packing.initial_void_fraction).particles
+            for protocol in model.protocols
+        )
         if needed > MOST_PARTICLES:
             allowed = (
-                f"needs {needed:.3g} spheres for a deep enough bed; at most {MOST_PARTICLES} are possible: leave "
+                f"needs {needed:.3g} spheres for a bed deep or a cell wide enough; at most {MOST_PARTICLES} are possible: leave "
                 "small crystals out of the packing (truncate_below_um), or give packing.particles"
             )
             yield Problem(file, *_source_of(name, model.csds[name]), allowed)
@@ -381,6 +391,35 @@ def _law_problems(model: Study, file: str) -> Iterable[Problem]:
         yield Problem(file, "resistance_law", repr(model.resistance_law), allowed)
 
 
+def _protocol_problems(model: Study, file: str) -> Iterable[Problem]:
+    """Keys that a study's protocols do not know, or need."""
+    pressed, pressure = FILTRATION_PROTOCOL in model.protocols, model.base("pressure_kPa")
+    keys = [(f"sweeps[{i}].", sweep, sweep.protocol or [model.packing.protocol]) for i, sweep in enumerate(model.sweeps)]
+    of_none = f"needs protocol: {FILTRATION_PROTOCOL}, in packing or in this block"
+    for where, sweep, protocols in keys:
+        for name in OF_FILTRATION:
+            if getattr(sweep, name) is not None and FILTRATION_PROTOCOL not in protocols:
+                yield Problem(file, where + name, shown(getattr(sweep, name)), of_none)
+        sticks = model.material.adhesion_mJ_m2 is not None or sweep.adhesion_mJ_m2 is not None
+        if sweep.cohesion_kJ_m3 is not None and sticks and protocols == [FILTRATION_PROTOCOL]:
+            allowed = "does nothing where adhesion_mJ_m2 is given; use one of them"
+            yield Problem(file, f"{where}cohesion_kJ_m3", shown(sweep.cohesion_kJ_m3), allowed)
+        if FILTRATION_PROTOCOL in protocols and pressure is None and sweep.pressure_kPa is None:
+            allowed = f"must be given with protocol: {FILTRATION_PROTOCOL} (or a filter with its pressure_drop_kPa)"
+            yield Problem(file, "packing.pressure_kPa", "(missing)", allowed)
+    if pressed:
+        if model.packing.engine not in (AUTO, Embedded.name):
+            allowed = f"cakes are pressed by the embedded engine: use {AUTO!r} or {Embedded.name!r}"
+            yield Problem(file, "packing.engine", repr(model.packing.engine), allowed)
+        return
+    for key, value in (
+        ("material.adhesion_mJ_m2", model.material.adhesion_mJ_m2),
+        ("packing.pressure_kPa", model.packing.pressure_kPa),
+    ):
+        if value is not None:
+            yield Problem(file, key, f"{value:g}", of_none)
+
+
 def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
     """Names of distributions that the study does not define."""
     known = list(model.csds)
@@ -392,16 +431,20 @@ def _reference_problems(model: Study, file: str) -> Iterable[Problem]:
             yield Problem(file, key, repr(name), allowed)
 
 
-def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[str, dict[str, tuple[str, float]], Scene]]:
+def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[str, dict[str, _Place], Scene]]:
     """Every scene of a study: its distribution, and the keys and values that a finding of the fence may be about."""
     for index, sweep in enumerate(model.sweeps):
         axes = [_values(model, index, name) for name in SWEPT]
         known = [name for name in sweep.csd or [] if name in csds]
-        for name, places in itertools.product(known, itertools.product(*axes)):
+        protocols = sweep.protocol or [model.packing.protocol]
+        for name, protocol, places in itertools.product(known, protocols, itertools.product(*axes)):
             where = dict(zip(SWEPT, places, strict=True))
-            scene = scene_of(model, csds[name].truncated, {axis: value for axis, (_, value) in where.items()})
+            swept = {axis: value for axis, (_, value) in where.items()}
+            scene = scene_of(model, csds[name].truncated, swept, protocol)
             keys = {
                 "cohesion": where["cohesion_kJ_m3"],
+                "adhesion": where["adhesion_mJ_m2"],
+                "pressure": where["pressure_kPa"],
                 "time_step": _time_step_key(model.packing, scene.rayleigh_fraction),
                 "restitution": where["restitution"],
                 "density": ("material.density_kg_m3", model.material.density),
@@ -416,11 +459,18 @@ def _time_step_key(packing: Packing, fraction: float) -> tuple[str, float]:
     return "packing.time_step_rayleigh", fraction
 
 
-def _values(model: Study, index: int, name: str) -> list[tuple[str, float]]:
+_Place = tuple[str, float | None]
+"""A key and its value."""
+
+
+def _values(model: Study, index: int, name: str) -> list[_Place]:
     """Values of one property that a sweep visits, each with its key."""
     given = getattr(model.sweeps[index], name)
     if given is None:
-        return [(f"material.{name}", getattr(model.material, name))]
+        key = f"material.{name}"
+        if name == "pressure_kPa":
+            key = "filter.pressure_drop_kPa" if model.packing.pressure_kPa is None else "packing.pressure_kPa"
+        return [(key, model.base(name))]
     return [(f"sweeps[{index}].{name}[{j}]", value) for j, value in enumerate(given)]
 
 

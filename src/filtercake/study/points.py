@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from filtercake.packing.scene import Scene, digest
+from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene, digest
 from filtercake.study.config.packing import AUTO
 from filtercake.study.config.study import Study
-from filtercake.study.config.sweep import SWEPT, Sweep
+from filtercake.study.config.sweep import OF_FILTRATION, SWEPT, Sweep
 from filtercake.study.loading import LoadedStudy
 from filtercake.study.scenes import scene_of
-from filtercake.units import KILOJOULE_PER_M3, MEGAPASCAL, tidy
+from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, MILLIJOULE_PER_M2, tidy
 
 ChooseEngine = Callable[[Scene], str]
 """Names an engine for a scene."""
 
-POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", *SWEPT, "engine", "porosity_ci95_target")
+POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", "protocol", *SWEPT, "engine", "porosity_ci95_target")
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Point:
     Attributes
     ----------
     name : str
-        Readable slug with a short hash of everything that decides the packing.
+        Readable slug with a short hash of everything that decides the result.
     study, csd : str
         Names of the study and of the distribution.
     residence_time_min : float or None
@@ -57,6 +57,14 @@ class Point:
     max_replicates: int = 0
 
     @property
+    def packings(self) -> str:
+        """Name of its packings: those of pressed cakes serve every pressure and every strength of the attraction."""
+        if not self.scene.is_pressed:
+            return self.name
+        packed = self.scene.as_packed()
+        return _safe(f"{self.csd}_pressed_mu{packed.friction:g}_{packed.attraction}_{digest(packed.decisive())[:8]}")
+
+    @property
     def most_replicates(self) -> int:
         """Packings that are made at most."""
         return self.replicates if self.porosity_ci95_target is None else max(self.replicates, self.max_replicates)
@@ -77,7 +85,10 @@ class Point:
             "study": self.study,
             "csd": self.csd,
             "residence_time_min": np.nan if self.residence_time_min is None else self.residence_time_min,
+            "protocol": self.scene.protocol,
             "cohesion_kJ_m3": tidy(self.scene.cohesion / KILOJOULE_PER_M3),
+            "adhesion_mJ_m2": tidy(self.scene.adhesion / MILLIJOULE_PER_M2) if self.scene.is_pressed else np.nan,
+            "pressure_kPa": tidy(self.scene.pressure / KILOPASCAL) if self.scene.is_pressed else np.nan,
             "friction": self.scene.friction,
             "poisson_ratio": self.scene.poisson_ratio,
             "restitution": self.scene.restitution,
@@ -103,12 +114,25 @@ def expand(study: LoadedStudy, choose_engine: ChooseEngine) -> list[Point]:
     for sweep in study.model.sweeps:
         axes = [_axis(study.model, sweep, name) for name in SWEPT]
         replicates = sweep.replicates or study.model.packing.replicates
-        for csd, values in itertools.product(sweep.csd or [], itertools.product(*axes)):
-            point = _point(study, csd, dict(zip(SWEPT, values, strict=True)), replicates, choose_engine)
+        protocols = sweep.protocol or [study.model.packing.protocol]
+        for csd, protocol, values in itertools.product(sweep.csd or [], protocols, itertools.product(*axes)):
+            swept = dict(zip(SWEPT, values, strict=True))
+            point = _point(study, csd, swept, replicates, choose_engine, protocol)
             known = points.get(point.name)
             if known is None or known.replicates < replicates:
                 points[point.name] = point
     return list(points.values())
+
+
+def packed(points: Iterable[Point]) -> dict[str, Point]:
+    """List what is packed for points, by the name of the packings: one for all points that they serve."""
+    found: dict[str, Point] = {}
+    for point in points:
+        name = point.packings
+        made = replace(point, name=name, scene=point.scene.as_packed())
+        if name not in found or found[name].replicates < point.replicates:
+            found[name] = made
+    return found
 
 
 def base_point(
@@ -118,8 +142,9 @@ def base_point(
     **changed: float,
 ) -> Point:
     """Return the point of a distribution at the study's base material, but for the properties named by ``changed``."""
-    base = {name: getattr(study.model.material, name) for name in SWEPT}
-    return _point(study, csd, {**base, **changed}, study.model.packing.replicates, choose_engine)
+    base = {name: study.model.base(name) for name in SWEPT}
+    settings = study.model.packing
+    return _point(study, csd, {**base, **changed}, settings.replicates, choose_engine, settings.protocol)
 
 
 def points_table(points: Iterable[Point]) -> pd.DataFrame:
@@ -129,28 +154,40 @@ def points_table(points: Iterable[Point]) -> pd.DataFrame:
 
 
 def base_rows(study: Study, table: pd.DataFrame, free: Collection[str] = ()) -> pd.DataFrame:
-    """Rows of a table of points at the study's base material, but for the properties named by ``free``."""
+    """Rows of a table of points at the study's base, but for the properties named by ``free``.
+
+    They are those of the study's own protocol, unless ``free`` names ``protocol``.
+    """
     keep = np.ones(len(table), dtype=bool)
+    if "protocol" not in free:
+        keep &= (table["protocol"] == study.packing.protocol).to_numpy()
+    pressed = (table["protocol"] == FILTRATION_PROTOCOL).to_numpy()
     for name in SWEPT:
-        if name not in free:
-            keep &= np.isclose(table[name].to_numpy(np.float64), getattr(study.material, name))
+        base = study.base(name)
+        if name in free or base is None:
+            continue
+        here = np.isclose(table[name].to_numpy(np.float64), base)
+        if name == "cohesion_kJ_m3" and study.material.adhesion_mJ_m2 is not None:
+            here |= pressed  # they stick by adhesion
+        keep &= here | (~pressed & (name in OF_FILTRATION))
     return table[keep]
 
 
-def _axis(study: Study, sweep: Sweep, name: str) -> list[float]:
+def _axis(study: Study, sweep: Sweep, name: str) -> list[float | None]:
     values = getattr(sweep, name)
-    return [getattr(study.material, name)] if values is None else list(values)
+    return [study.base(name)] if values is None else list(values)
 
 
 def _point(
     study: LoadedStudy,
     csd_name: str,
-    swept: dict[str, float],
+    swept: Mapping[str, float | None],
     replicates: int,
     choose_engine: ChooseEngine,
+    protocol: str,
 ) -> Point:
     settings = study.model.packing
-    scene = scene_of(study.model, study.csds[csd_name].truncated, swept)
+    scene = scene_of(study.model, study.csds[csd_name].truncated, swept, protocol)
     if scene.engine == AUTO:
         scene = replace(scene, engine=choose_engine(scene))
     return Point(
@@ -165,10 +202,20 @@ def _point(
     )
 
 
-def _slug(csd_name: str, swept: dict[str, float], study: Study, scene: Scene) -> str:
-    """Readable prefix and a hash of all that decides the packing (not of time limits or labels)."""
-    parts = [csd_name, f"s{swept['cohesion_kJ_m3']:g}", f"mu{swept['friction']:g}"]
+def _slug(csd_name: str, swept: Mapping[str, float | None], study: Study, scene: Scene) -> str:
+    """Readable prefix and a hash of all that decides the result (not of time limits or labels)."""
+    stick = f"s{swept['cohesion_kJ_m3']:g}"
+    if scene.is_pressed and swept["adhesion_mJ_m2"] is not None:
+        stick = f"W{swept['adhesion_mJ_m2']:g}"
+    parts = [csd_name, stick, f"mu{scene.friction:g}"]
+    if scene.is_pressed:
+        parts.append(f"p{swept['pressure_kPa']:g}")
     for name, short in (("poisson_ratio", "nu"), ("restitution", "e"), ("youngs_modulus_MPa", "E")):
-        if swept[name] != getattr(study.material, name):
+        if swept[name] != study.base(name):
             parts.append(f"{short}{swept[name]:g}")
-    return re.sub(r"[^A-Za-z0-9_.-]", "-", "_".join([*parts, digest(scene.decisive())[:8]]))
+    return _safe("_".join([*parts, digest(scene.decisive())[:8]]))
+
+
+def _safe(name: str) -> str:
+    """Replace what file names should not have."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", name)

@@ -8,7 +8,16 @@ from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from filtercake.packing.engines import ENGINES, kind_of
 from filtercake.study import limits
-from filtercake.study.config.values import LARGEST_INTEGER, MOST_PARTICLES, TO_NUMBER, TO_WHOLE, Model
+from filtercake.packing.scene import GRAVITY_PROTOCOL
+from filtercake.study.config.values import (
+    LARGEST_INTEGER,
+    MOST_PARTICLES,
+    TO_NUMBER,
+    TO_WHOLE,
+    Model,
+    Pressure,
+    Protocol,
+)
 from filtercake.study.limits import FRICTIONAL_TIME_STEP, FRICTIONLESS_TIME_STEP
 
 AUTO = "auto"
@@ -27,11 +36,19 @@ EngineName = Annotated[str, AfterValidator(_engine), WithJsonSchema({"enum": [AU
 class Packing(Model):
     """How the packings are made."""
 
+    protocol: Protocol = Field(
+        default=GRAVITY_PROTOCOL,
+        description="gravity drops the spheres, as the paper does; filtration presses them as a filter does.",
+    )
+    pressure_kPa: Pressure | None = Field(  # noqa: N815
+        default=None,
+        description="Pressure drop across the cake, kPa (protocol: filtration); the filter's if left out.",
+    )
     particles: Annotated[int, Field(ge=50, le=MOST_PARTICLES), TO_WHOLE] | None = Field(
         default=None,
         description=(
             "Spheres in one packing; if left out, 2000, or as many as make a bed of a broad distribution deep enough "
-            "(largest over smallest size above 4)."
+            "(largest over smallest size above 4) or fill a wide enough cell (protocol: filtration)."
         ),
     )
     initial_void_fraction: Annotated[float, Field(ge=0.5, le=0.95, allow_inf_nan=False), TO_NUMBER] = Field(

@@ -49,6 +49,20 @@ class Study(Model):
     )
 
 
+    def base(self, name: str) -> float | None:
+        """Base value of a property of ``SWEPT``; None where there is none."""
+        if name == "pressure_kPa":
+            drop = None if self.filter is None else self.filter.pressure_drop_kPa
+            return drop if self.packing.pressure_kPa is None else self.packing.pressure_kPa
+        value: float | None = getattr(self.material, name)
+        return value
+
+    @property
+    def protocols(self) -> set[str]:
+        """Protocols of its points."""
+        return {name for sweep in self.sweeps for name in sweep.protocol or [self.packing.protocol]}
+
+
 class Workflow(Model):
     """The workflow's configuration: which studies to run, and where their results go."""
 

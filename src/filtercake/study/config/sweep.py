@@ -10,18 +10,23 @@ from filtercake.study.config.values import (
     ENTRIES,
     LISTED,
     TO_WHOLE,
+    Adhesion,
     Cohesion,
     Friction,
     Model,
     Name,
     PoissonRatio,
+    Pressure,
+    Protocol,
     ResidenceTime,
     Restitution,
     YoungsModulus,
 )
 
-SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
-"""Properties a sweep may vary, besides the distribution."""
+OF_FILTRATION = ("adhesion_mJ_m2", "pressure_kPa")
+"""What only pressed cakes have of them; nothing in the rows of others."""
+SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa", *OF_FILTRATION)
+"""Properties a sweep may vary, besides the distribution and the protocol."""
 
 
 class Sweep(Model):
@@ -48,6 +53,15 @@ class Sweep(Model):
     youngs_modulus_MPa: (  # noqa: N815
         Annotated[list[YoungsModulus], LISTED, ENTRIES] | None
     ) = Field(default=None, description="Young's moduli, MPa.")
+    adhesion_mJ_m2: Annotated[list[Adhesion], LISTED, ENTRIES] | None = Field(  # noqa: N815
+        default=None, description="Works of adhesion, mJ/m2 (protocol: filtration)."
+    )
+    pressure_kPa: Annotated[list[Pressure], LISTED, ENTRIES] | None = Field(  # noqa: N815
+        default=None, description="Pressure drops across the cake, kPa (protocol: filtration)."
+    )
+    protocol: Annotated[list[Protocol], LISTED, ENTRIES] | None = Field(
+        default=None, description="Protocols of this block, instead of packing.protocol."
+    )
     replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] | None = Field(
         default=None, description="Packings per point of this block, instead of packing.replicates."
     )

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from filtercake.errors import did_you_mean
 from filtercake.filtration.resistance import RESISTANCE_LAWS
+from filtercake.packing.scene import PROTOCOLS
 from filtercake.study import limits
 from filtercake.units import NUMBER
 from filtercake.user_files import as_written
@@ -112,6 +113,13 @@ def _law(name: str) -> str:
     return name
 
 
+def _protocol(name: str) -> str:
+    """Refuse what no protocol is called."""
+    if name not in PROTOCOLS:
+        raise ValueError(f"allowed: {', '.join(map(repr, PROTOCOLS))}{did_you_mean(name, PROTOCOLS)}")
+    return name
+
+
 # the bounds stand before the conversion, or they are lost from the JSON schema
 TO_NUMBER = BeforeValidator(_number)
 TO_WHOLE = BeforeValidator(_whole)
@@ -126,7 +134,11 @@ YoungsModulus = Annotated[float, Field(ge=0.5, le=100_000, allow_inf_nan=False),
 PoissonRatio = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False), TO_NUMBER]
 Restitution = Annotated[float, Field(ge=0.001, lt=1, allow_inf_nan=False), TO_NUMBER]
 Friction = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False), TO_NUMBER]
+Adhesion = Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False), TO_NUMBER]
+Pressure = Annotated[float, Field(ge=0.001, le=10_000, allow_inf_nan=False), TO_NUMBER]
+CrystalModulus = Annotated[float, Field(ge=1e-4, le=2000, allow_inf_nan=False), TO_NUMBER]
 Cohesion = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False), TO_NUMBER]
+Protocol = Annotated[str, AfterValidator(_protocol), WithJsonSchema({"enum": [*PROTOCOLS], "type": "string"})]
 LawName = Annotated[str, AfterValidator(_law), WithJsonSchema({"enum": [*RESISTANCE_LAWS], "type": "string"})]
 
 ResidenceTime = Annotated[float, Field(ge=0.001, le=100_000, allow_inf_nan=False), TO_NUMBER]
