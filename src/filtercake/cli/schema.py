@@ -201,6 +201,9 @@ def _example(key: str) -> str:
         "poisson_ratio": "[0.2, 0.3]",
         "restitution": "[0.3, 0.6]",
         "youngs_modulus_MPa": "[5, 10]",
+        "adhesion_mJ_m2": "[0, 1, 10]",
+        "pressure_kPa": "[25, 50, 100]",
+        "protocol": "[gravity, filtration]",
     }
     return examples[key]
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from filtercake.calibration.measurements import Measurements, compressibility_by_csd
+from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL
 from filtercake.study.config.study import Study
 from filtercake.study.points import Point
 
@@ -66,12 +67,20 @@ def _solves_flow(study: Study) -> bool:
     return study.permeability is not None
 
 
+def _falls(study: Study) -> bool:
+    return study.packing.protocol == GRAVITY_PROTOCOL
+
+
+def _pressed(study: Study) -> bool:
+    return FILTRATION_PROTOCOL in study.protocols
+
+
 def _filters(study: Study) -> bool:
     return study.filter is not None
 
 
 FIGURES: dict[str, FigureSpec] = {
-    "fig03_porosity_trajectory": FigureSpec("trajectory"),
+    "fig03_porosity_trajectory": FigureSpec("trajectory", needs=_falls),
     "fig05_truncation": FigureSpec("truncation", needs=_truncates),
     "fig08_resistance_vs_porosity": FigureSpec("resistance_porosity"),
     "fig09_porosity_vs_cohesion": FigureSpec("porosity_cohesion", _varies("cohesion")),
@@ -83,9 +92,10 @@ FIGURES: dict[str, FigureSpec] = {
     "sensitivity_poisson_restitution": FigureSpec(
         "sensitivity", lambda points: _varies("poisson_ratio")(points) or _varies("restitution")(points)
     ),
+    "cake_compression": FigureSpec("compression", needs=_pressed),
     "packing_cross_section": FigureSpec("cross_section"),
     "packing_flow": FigureSpec("flow", needs=_solves_flow),
-    "packing_porosity_profile": FigureSpec("profile"),
+    "packing_porosity_profile": FigureSpec("profile", needs=_falls),
 }
 """Figures of studies."""
 

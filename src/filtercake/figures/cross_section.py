@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -14,6 +16,7 @@ from matplotlib.patches import Circle
 from filtercake.figures import selection, style
 from filtercake.figures.selection import StudyData
 from filtercake.packing.result import Packing
+from filtercake.packing.scene import FILTRATION_PROTOCOL
 from filtercake.packing.slab import bed_height, interior_slab
 from filtercake.units import MICROMETRE, FloatArray
 
@@ -38,15 +41,21 @@ def draw(data: StudyData) -> Figure:
         return figure
     replicate, packing = found[0]
     _spheres(figure, axes, packing)
-    _levels(axes, packing)
+    if not is_pressed(packing):
+        _levels(axes, packing)
     style.legend(figure, [axes], columns=3)
     what = f"replicate {replicate} of {selection.label(data, str(point['csd']))}, plane y = L/2"
     style.footer(figure, rows, what, note)
     return figure
 
 
+def is_pressed(packing: Packing) -> bool:
+    """Whether a packing is a pressed cell, periodic in all directions."""
+    return packing.diagnostics.get("protocol") == FILTRATION_PROTOCOL
+
+
 def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Circles in which the plane at ``y`` (m) cuts the spheres, periodic images in x and y included.
+    """Circles in which the plane at ``y`` (m) cuts the spheres, periodic images included (of pressed cells also in z).
 
     Returns
     -------
@@ -60,9 +69,12 @@ def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, F
     circle = np.sqrt(radius[cut] ** 2 - offset[cut] ** 2)
     x, z, diameter = position[cut, 0], position[cut, 2], 2.0 * radius[cut]
     parts = []
-    for shift in (-length, 0.0, length):
+    images = (-length, 0.0, length)
+    for shift, lift in itertools.product(images, images if is_pressed(packing) else (0.0,)):
         seen = (x + shift + circle > 0.0) & (x + shift - circle < length)
-        parts.append(np.column_stack([x[seen] + shift, z[seen], circle[seen], diameter[seen]]))
+        if is_pressed(packing):
+            seen &= (z + lift + circle > 0.0) & (z + lift - circle < length)
+        parts.append(np.column_stack([x[seen] + shift, z[seen] + lift, circle[seen], diameter[seen]]))
     found = np.concatenate(parts)
     return found[:, :2], found[:, 2], found[:, 3]
 
@@ -86,12 +98,15 @@ def _spheres(figure: Figure, axes: Axes, packing: Packing) -> None:
         figure.colorbar(ScalarMappable(norm, shades), ax=axes, label="Sphere diameter (µm)", shrink=0.8)
     side = packing.length / MICROMETRE
     axes.set_xlim(0.0, side)
+    axes.set_aspect("equal")
+    if is_pressed(packing):
+        axes.set_ylim(0.0, side)
+        return
     # up to what lies on the bed: a sphere that was thrown up and has not come back would stretch the picture
     lying = bed_height(packing.position, packing.radius) + 2.0 * float(packing.radius.max())
     highest = float((packing.position[:, 2] + packing.radius).max())
     top = min(highest, lying) / MICROMETRE
     axes.set_ylim(-0.02 * top, 1.02 * top)
-    axes.set_aspect("equal")
 
 
 def _levels(axes: Axes, packing: Packing) -> None:

@@ -31,6 +31,8 @@ def draw(data: StudyData) -> Figure:
         _beside(resistance, table, f"resistance_{law}_m_kg", law)
         _beside(area, table, f"filter_area_{law}_m2", law)
         _beside(share, percent, f"medium_share_{law}", law)
+    for protocol in sorted(data.study.protocols - {data.study.packing.protocol}):
+        _by_protocol(panels, filtered(data, protocol), protocol)
     published(resistance, data, table, "resistance_m_kg")
     published(area, data, table, "filter_area_m2")
     published(share, data, table, "medium_share", scale=100.0)
@@ -104,6 +106,22 @@ def _beside(axes: Axes, table: pd.DataFrame, column: str, law: str) -> None:
         label=f"same packings by {selection.law_title(law)}",
         gid="beside",
     )
+
+
+def _by_protocol(panels: list[Axes], table: pd.DataFrame, protocol: str) -> None:
+    """Plot what packings made by the other protocol say, by the study's law."""
+    percent = table.assign(medium_share=100.0 * table["medium_share"])
+    for axes, column in zip(panels, ("resistance_m_kg", "filter_area_m2", "medium_share"), strict=True):
+        axes.plot(
+            table[VOLUME],
+            percent[column],
+            "^:",
+            color=style.colour(3),
+            markersize=3.0,
+            linewidth=0.9,
+            label=f"packed by {protocol}",
+            gid="beside",
+        )
 
 
 def _series(axes: Axes, table: pd.DataFrame, column: str, interval: str | tuple[str, str]) -> None:

@@ -10,13 +10,15 @@ from filtercake.results.filter_design import filter_design
 from filtercake.results.resistance_columns import ALWAYS
 
 
-def filtered(data: StudyData) -> pd.DataFrame:
+def filtered(data: StudyData, protocol: str = "") -> pd.DataFrame:
     """Tabulate the filter of every product at the base material (see ``filter_design``), smallest crystallizer first.
+
+    Packings are those of a protocol, the study's own if left out.
 
     ``medium_share_low`` and ``medium_share_high`` are the medium's shares at the ends of the resistance's interval,
     ``medium_share_<law>`` those by the laws that every table has.
     """
-    rows = selection.base_points(data)
+    rows = selection.base_points(data, protocol)
     rows = rows[rows["residence_time_min"].notna()]
     table = filter_design(data.study, data.csds, rows).sort_values("crystallizer_volume_m3", kind="stable")
     # the share is the area of the medium alone over the area needed

@@ -32,7 +32,7 @@ def draw(data: StudyData) -> Figure:
         return figure
     name = str(point["point"])
     found, note = selection.packings(data, name, most=1)
-    picture = read_picture(data.packings.parent / "permeability" / name)
+    picture = read_picture(data.packings.parent / "permeability" / selection.folder(data, name))
     rows = data.summary[data.summary["point"] == name]
     if not found or picture is None:
         style.nothing(axes, "no accepted packing at the base material")

@@ -85,6 +85,11 @@ def law_note(data: StudyData) -> str:
     return f"resistances by {law_title(data.study.resistance_law)}"
 
 
+def folder(data: StudyData, point: str) -> str:
+    """Name of the folder of a point's packings, which pressed points share."""
+    return str(data.points.loc[data.points["point"] == point, "packings"].iloc[0])
+
+
 def label(data: StudyData, csd: str) -> str:
     """Label of a distribution."""
     known = data.study.csds.get(csd)
@@ -96,9 +101,13 @@ def number(data: StudyData, csd: str) -> int:
     return list(data.study.csds).index(csd)
 
 
-def base_points(data: StudyData) -> pd.DataFrame:
-    """Summary rows at the base material, one per distribution that has one, in the study's order of distributions."""
-    rows = base_rows(data.study, data.summary)
+def base_points(data: StudyData, protocol: str = "") -> pd.DataFrame:
+    """Summary rows at the base material, one per distribution that has one, in the study's order of distributions.
+
+    They are those of a protocol, the study's own if left out.
+    """
+    rows = base_rows(data.study, data.summary, ("protocol",))
+    rows = rows[rows["protocol"] == (protocol or data.study.packing.protocol)]
     return rows.sort_values("csd", key=lambda names: names.map(lambda csd: number(data, csd)), kind="stable")
 
 
@@ -166,7 +175,7 @@ def _accepted(
         if len(found) == most:
             break
         try:
-            found.append((replicate, read(data.packings / point / f"r{replicate}.npz")))
+            found.append((replicate, read(data.packings / folder(data, point) / f"r{replicate}.npz")))
         except PackingRejected:
             lost += 1
     return found, f"{lost} packing{'' if lost == 1 else 's'} could not be read" if lost else ""

@@ -92,7 +92,7 @@ def cake_profile(load: float, porosity: PorosityOfLoad) -> CakeProfile:
 
 
 def _cut(load: float, porosity: PorosityOfLoad) -> tuple[FloatArray, FloatArray]:
-    """Loads from 1 to that of the medium, and the porosities there; one without attraction, where all is even."""
+    """Cut a cake at loads from 1 to that of the medium, with their porosities; once without attraction: all is even."""
     if not load >= 1.0 - 1e-9:
         raise ValueError(f"load = {load:g}: must be at least 1")
     if math.isinf(load):

@@ -138,8 +138,8 @@ def stages(scene: Scene, loads: Sequence[float], seed: int) -> list[CellScene]:
     return [replace(base, stress=p, **_attraction(scene, base, p / x)) for p, x in zip(stress, loads, strict=True)]
 
 
-def _attraction(scene: Scene, cell: CellScene, strength: float) -> dict[str, float]:
-    """What makes a cell's contacts hold a stress (Pa)."""
+def _attraction(scene: Scene, cell: CellScene, strength: float) -> dict[str, Any]:
+    """Choose what makes a cell's contacts hold a stress (Pa)."""
     if scene.attraction == "adhesion":
         return {"adhesion": strength / contact_law.adhesive_strength(1.0, cell.sauter_mean)}
     return {"cohesion": contact_law.cohesion_of_strength(strength, cell.youngs_modulus, cell.poisson_ratio)}

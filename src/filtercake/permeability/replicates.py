@@ -15,7 +15,7 @@ from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.result import Packing, publish, read_record, read_sealed, sealed, sha256, write_json
 from filtercake.packing.scene import FILTRATION_PROTOCOL, digest
-from filtercake.permeability.measure import bed_domain, cell_domain, solve
+from filtercake.permeability.measure import Domain, bed_domain, cell_domain, solve
 from filtercake.permeability.result import Permeability, Picture
 
 RECORD: Final = "permeability.json"
@@ -59,9 +59,8 @@ def solve_replicates(
         picture = folder / PICTURE if not rows else None
         row = _kept(folder / f"r{outcome.replicate}.json", key, picture)
         if row is None:
-            domain = cell_domain if packing.diagnostics.get("protocol") == FILTRATION_PROTOCOL else bed_domain
             found, cut = solve(
-                domain(packing.position, packing.radius, packing.length, accuracy),
+                _domain(packing, accuracy),
                 accuracy,
                 say=lambda line, who=outcome.replicate: note(f"r{who} {line}"),  # type: ignore[misc]
                 picture=picture is not None,
@@ -73,6 +72,13 @@ def solve_replicates(
             report(f"r{outcome.replicate}: k = {found.permeability:.4g} m2, {found.seconds:.1f} s")
         rows.append(row)
     write_json(folder / RECORD, sealed({"packings": rows}))
+
+
+def _domain(packing: Packing, accuracy: float) -> Domain:
+    """Take a settled bed between its floor and surface, a pressed cell whole."""
+    if packing.diagnostics.get("protocol") == FILTRATION_PROTOCOL:
+        return cell_domain(packing.position, packing.radius, np.full(3, packing.length), accuracy)
+    return bed_domain(packing.position, packing.radius, packing.length, accuracy)
 
 
 def row_of(found: Permeability) -> dict[str, Any]:

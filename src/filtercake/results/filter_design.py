@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 
@@ -20,7 +22,8 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
     The columns are crystallizer volume, porosity and resistance by the study's law, those of
     :data:`filtercake.filtration.drum_filter.DESIGN_COLUMNS`, the area at both ends of the resistance's 95 % interval
     over the packings (low, high) and of the law's own (law_low, law_high), the areas by the laws ``additive`` and
-    ``carman`` and the relative change from the first to the second, and the published area.
+    ``carman`` and the relative change from the first to the second, and the published area. Pressed cakes are on the
+    filter at their own pressure drop; ``compressibility`` is the exponent n of their resistance.
 
     Raises
     ------
@@ -30,6 +33,18 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
     if study.filter is None or study.crystallizer is None:
         raise FilterError("the study has no filter: add the sections crystallizer and filter")
     drum = drum_of(study)
+    pressures = summary["pressure_kPa"].fillna(drum.pressure_drop / KILOPASCAL)
+    parts = [
+        _design(study, replace(drum, pressure_drop=float(pressure) * KILOPASCAL), csds, summary[pressures == pressure])
+        for pressure in pressures.unique() if len(summary) else [drum.pressure_drop / KILOPASCAL]
+    ]
+    return pd.concat(parts).loc[summary.index].reset_index(drop=True)
+
+
+def _design(study: Study, drum: DrumFilter, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate a drum at one pressure drop, with the index of the summary's rows."""
+    if study.filter is None or study.crystallizer is None:
+        raise FilterError("the study has no filter: add the sections crystallizer and filter")
     flow = study.crystallizer.slurry_flow_m3_h / HOUR
     names = [str(name) for name in summary["csd"]]
     cakes = [
@@ -38,7 +53,8 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
             names, summary["resistance_m_kg"].to_list(), summary["porosity"].to_list(), strict=True
         )
     ]
-    columns = ["point", "csd", "residence_time_min", "cohesion_kJ_m3", "friction", "engine", "n", "n_failed"]
+    columns = ["point", "csd", "residence_time_min", "protocol", "cohesion_kJ_m3", "adhesion_mJ_m2", "pressure_kPa"]
+    columns += ["friction", "engine", "n", "n_failed", "compressibility", "compressibility_ci95"]
     columns += ["porosity", "porosity_ci95", "resistance_m_kg", "resistance_ci95_m_kg", LAW, LAW_CI95]
     columns += [f"resistance_{law}_m_kg" for law in ALWAYS]
     table = summary[columns].reset_index(drop=True)
@@ -52,7 +68,7 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
         table[f"filter_area_{law}_m2"] = _areas(drum, table[f"resistance_{law}_m_kg"], flow)
     table["area_change_by_carman"] = table["filter_area_carman_m2"] / table["filter_area_additive_m2"] - 1.0
     table["published_area_m2"] = [published_number(study, name, "filter_area_m2", "simulation") for name in names]
-    return table
+    return table.set_index(summary.index)
 
 
 def _areas(drum: DrumFilter, resistance: pd.Series[float], flow: float) -> FloatArray:

@@ -351,7 +351,10 @@ def _load_csd(
 def _size_problems(model: Study, file: str) -> Iterable[Problem]:
     """Studies with more points or distributions than can be handled."""
     points = sum(
-        len(sweep.csd or []) * len(sweep.protocol or [0]) * math.prod(len(getattr(sweep, name) or [0]) for name in SWEPT) for sweep in model.sweeps
+        len(sweep.csd or [])
+        * len(sweep.protocol or [0])
+        * math.prod(len(getattr(sweep, name) or [0]) for name in SWEPT)
+        for sweep in model.sweeps
     )
     if points > MOST_POINTS:
         yield Problem(file, "sweeps", f"{points} points", f"must be at most {MOST_POINTS} points; make several studies")
@@ -394,7 +397,9 @@ def _law_problems(model: Study, file: str) -> Iterable[Problem]:
 def _protocol_problems(model: Study, file: str) -> Iterable[Problem]:
     """Keys that a study's protocols do not know, or need."""
     pressed, pressure = FILTRATION_PROTOCOL in model.protocols, model.base("pressure_kPa")
-    keys = [(f"sweeps[{i}].", sweep, sweep.protocol or [model.packing.protocol]) for i, sweep in enumerate(model.sweeps)]
+    keys = [
+        (f"sweeps[{i}].", sweep, sweep.protocol or [model.packing.protocol]) for i, sweep in enumerate(model.sweeps)
+    ]
     of_none = f"needs protocol: {FILTRATION_PROTOCOL}, in packing or in this block"
     for where, sweep, protocols in keys:
         for name in OF_FILTRATION:

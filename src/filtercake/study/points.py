@@ -22,7 +22,17 @@ from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, MILLIJOUL
 ChooseEngine = Callable[[Scene], str]
 """Names an engine for a scene."""
 
-POINT_COLUMNS = ("point", "study", "csd", "residence_time_min", "protocol", *SWEPT, "engine", "porosity_ci95_target")
+POINT_COLUMNS = (
+    "point",
+    "study",
+    "csd",
+    "residence_time_min",
+    "protocol",
+    *SWEPT,
+    "engine",
+    "porosity_ci95_target",
+    "packings",
+)
 
 
 @dataclass(frozen=True)
@@ -95,6 +105,7 @@ class Point:
             "youngs_modulus_MPa": tidy(self.scene.youngs_modulus / MEGAPASCAL),
             "engine": self.scene.engine,
             "porosity_ci95_target": np.nan if self.porosity_ci95_target is None else self.porosity_ci95_target,
+            "packings": self.packings,
         }
 
 

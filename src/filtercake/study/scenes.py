@@ -85,7 +85,7 @@ def scene_of(
 
 
 def _pressed(study: Study, value: Mapping[str, float]) -> dict[str, Any]:
-    """What a scene of a pressed cake has more."""
+    """Collect what a scene of a pressed cake has more."""
     return {
         "protocol": FILTRATION_PROTOCOL,
         "pressure": value["pressure_kPa"] * KILOPASCAL,

@@ -111,7 +111,14 @@ def replicate_rows(
     rows = []
     for name, csd, differs, porosities in points:
         for k, porosity in enumerate(porosities):
-            row: dict[str, Any] = {"point": name, "study": "made_up", "csd": csd, "engine": "liggghts"}
+            row: dict[str, Any] = {
+                "point": name,
+                "packings": name,
+                "study": "made_up",
+                "csd": csd,
+                "engine": "liggghts",
+            }
+            row |= {"protocol": "gravity"}
             row |= {**BASE, **differs, "replicate": k, "status": "failed", "reason": "not settled"}
             if porosity is not None:
                 row |= {

@@ -26,7 +26,9 @@ class Material(Model):
     density_kg_m3: Density | None = Field(
         default=None, description="Crystal density, kg/m3; that of the crystallizer's kinetics if left out."
     )
-    youngs_modulus_MPa: YoungsModulus = Field(default=5.0, description="Young's modulus of the simulated crystals, MPa.")  # noqa: N815
+    youngs_modulus_MPa: YoungsModulus = Field(  # noqa: N815
+        default=5.0, description="Young's modulus of the simulated crystals, MPa."
+    )
     poisson_ratio: PoissonRatio = Field(default=0.2, description="Poisson's ratio.")
     restitution: Restitution = Field(default=0.3, description="Coefficient of restitution.")
     friction: Friction = Field(default=0.0, description="Coefficient of friction.")

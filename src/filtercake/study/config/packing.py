@@ -7,8 +7,8 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from filtercake.packing.engines import ENGINES, kind_of
-from filtercake.study import limits
 from filtercake.packing.scene import GRAVITY_PROTOCOL
+from filtercake.study import limits
 from filtercake.study.config.values import (
     LARGEST_INTEGER,
     MOST_PARTICLES,

@@ -48,9 +48,8 @@ class Study(Model):
         default=[], description="Published values to show beside ours."
     )
 
-
     def base(self, name: str) -> float | None:
-        """Base value of a property of ``SWEPT``; None where there is none."""
+        """Return the base value of a property of ``SWEPT``; None where there is none."""
         if name == "pressure_kPa":
             drop = None if self.filter is None else self.filter.pressure_drop_kPa
             return drop if self.packing.pressure_kPa is None else self.packing.pressure_kPa
