@@ -95,8 +95,8 @@ def adhesive_force(adhesion: float, radius_i: float, radius_j: float) -> float:
     spheres that draw apart across a gap, with it the hysteresis (making and breaking a contact costs no energy but the
     damping's), and that adhesion changes the stiffness. All this happens within overlaps and gaps of the order of
     :func:`adhesive_overlap`; where they vanish against the spheres, in the rigid limit, so does the difference at rest.
-    As with SJKR, the Coulomb limit is mu times the repulsive part alone: without load mu times this force, where SJKR has
-    mu times 27/4 of its pull-off.
+    As with SJKR, the Coulomb limit is mu times the repulsive part alone: without load mu times this force, where SJKR
+    has mu times 27/4 of its pull-off.
 
     Parameters
     ----------

@@ -395,7 +395,7 @@ def test_with_friction_cohesion_packs_looser_than_adhesion_for_its_repulsion_is_
     cohesive, adhesive = (mean_porosity(1, friction=0.05, **{law: 2}) for law in ("x", "adhesive_x"))
     # six of each: 0.4425, 0.4009, standard deviations 0.007, 0.002
     assert cohesive > adhesive + 0.015
-    # under twice its pull-off a contact repels with 12.1 times that in SJKR, 3 times here: fourfold friction evens it out
+    # under twice its pull-off a contact repels with 12.1 times that in SJKR, 3 times here: fourfold friction makes even
     assert mean_porosity(1, friction=0.2, adhesive_x=2) == pytest.approx(cohesive, abs=0.03)
 
 
