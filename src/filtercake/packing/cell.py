@@ -64,7 +64,10 @@ class CellScene:
     friction, restitution : float
         Coefficients of friction and restitution.
     cohesion : float
-        Cohesion energy density, J/m3.
+        Cohesion energy density of SJKR, J/m3: a contact pulls off at a force that grows with R*^2.
+    adhesion : float
+        Work of adhesion W, J/m2, at the modulus below, instead of cohesion: a contact pulls off at ``1.5 pi W R*``,
+        whatever its overlap (:func:`filtercake.packing.contact_law.adhesive_force`).
     youngs_modulus, poisson_ratio : float
         Young's modulus, Pa, and Poisson's ratio.
     seed : int
@@ -92,6 +95,7 @@ class CellScene:
     friction: float = 0.0
     restitution: float = 0.3
     cohesion: float = 0.0
+    adhesion: float = 0.0
     youngs_modulus: float = 5e6
     poisson_ratio: float = 0.2
     seed: int = 1
@@ -108,6 +112,10 @@ class CellScene:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise CellError(f"{name} = {value:g}: must be {allowed}")
+        if self.adhesion > 0.0 and self.cohesion > 0.0:
+            raise CellError(
+                f"adhesion = {self.adhesion:g} J/m2: must be 0 where there is cohesion, here {self.cohesion:g} J/m3"
+            )
         radius = self.radius
         if radius.ndim != 1 or radius.size < 2 or not (np.isfinite(radius).all() and (radius > 0.0).all()):
             raise CellError(f"radius = array of shape {radius.shape}: must be at least two finite numbers above 0")
@@ -127,7 +135,9 @@ class CellScene:
 
     @property
     def strength(self) -> float:
-        """Stress that cohesion holds, Pa."""
+        """Stress p_c that the contacts hold, Pa; under adhesion, those of spheres of the Sauter mean."""
+        if self.adhesion > 0.0:
+            return contact_law.adhesive_strength(self.adhesion, self.sauter_mean)
         return contact_law.cohesive_strength(self.cohesion, self.youngs_modulus, self.poisson_ratio)
 
     @property
@@ -168,6 +178,7 @@ _ALLOWED: Final = {
     "friction": (0.0, 10.0, "0 to 10"),
     "restitution": (1e-3, 1.0, "0.001 to 1"),
     "cohesion": _NOT_BELOW,
+    "adhesion": _NOT_BELOW,
     "youngs_modulus": _ABOVE,
     "poisson_ratio": (0.0, 0.5, "0 to 0.5"),
     "void_fraction": (0.55, 0.99, "0.55 to 0.99"),
@@ -278,7 +289,7 @@ def press_along(scene: CellScene, stresses: Sequence[float]) -> list[PressedCell
         What is asked for; ``patience`` is that at each stress.
     stresses : sequence of float
         Stresses, Pa, instead of the scene's; each at most about twice the one before, and the first, with friction,
-        at most four times what cohesion holds.
+        at most four times what the contacts hold.
 
     Returns
     -------
@@ -296,9 +307,9 @@ def press_along(scene: CellScene, stresses: Sequence[float]) -> list[PressedCell
 
 
 def press_through(stages: Sequence[CellScene]) -> list[PressedCell]:
-    """Lead one cell through scenes that differ in stress and cohesion only, to rest in each.
+    """Lead one cell through scenes that differ in stress and attraction only, to rest in each.
 
-    At rest only their ratio counts, so that a weaker cohesion under the same stress is a higher load.
+    At rest only their ratio counts, so that a weaker cohesion or adhesion under the same stress is a higher load.
 
     Raises
     ------

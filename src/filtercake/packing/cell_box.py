@@ -55,8 +55,6 @@ class CellBox:
         self.smallest = 2.0 * float(scene.radius.min())
         self.widest = 2.0 * float(scene.radius.max())
         self.box = np.array([length, 0.0])
-        self.kernel = cell_kernels.make_advance(scene.cohesion > 0.0, self.frictional)
-        self.averages = cell_kernels.make_measure(scene.cohesion > 0.0, self.frictional)
         self.find_pairs = kernels.make_find_pairs(False)
         self.room = 8 * n
         self.listed_at = 0
@@ -66,11 +64,13 @@ class CellBox:
         self._list_pairs()
 
     def lead_to(self, scene: CellScene) -> None:
-        """Go on to the stress and the cohesion of another scene that differs in nothing else.
+        """Go on to the stress and the attraction of another scene that differs in nothing else.
 
-        Drag and servo follow from the stress. What starts without cohesion has none later.
+        Drag and servo follow from the stress.
         """
         self.scene, self.law = scene, _law(scene)
+        self.kernel = cell_kernels.make_advance(_attraction(scene), self.frictional)
+        self.averages = cell_kernels.make_measure(_attraction(scene), self.frictional)
         self.servo = cell_kernels.Servo(scene.stress, scene.servo * scene.rate / 3.0)
         self.drag[:] = (scene.drag * scene.rate / scene.heaviness)[self.identity]
 
@@ -229,6 +229,13 @@ def _wrapped(position: FloatArray, length: float) -> FloatArray:
     return np.asarray(found)
 
 
+def _attraction(scene: CellScene) -> int:
+    """Choose the kind of attraction that the kernels are compiled for."""
+    if scene.adhesion > 0.0:
+        return kernels.ADHESION
+    return kernels.COHESION if scene.cohesion > 0.0 else kernels.NO_ATTRACTION
+
+
 def _law(scene: CellScene) -> kernels.Law:
     """Collect what is the same for all spheres; images have rows of their own, so that no length is needed."""
     material = scene.youngs_modulus, scene.poisson_ratio
@@ -240,6 +247,7 @@ def _law(scene: CellScene) -> kernels.Law:
         shear_damping=contact_law.shear_damping_ratio(*material),
         length=0.0,
         time_step=scene.time_step,
+        adhesion=float(scene.adhesion),
     )
 
 

@@ -187,7 +187,7 @@ def room_left(state: FloatArray, length: float, reach: Reach) -> float:
 
 
 @cache
-def make_advance(cohesive: bool, frictional: bool) -> Callable[..., tuple[int, bool]]:
+def make_advance(attraction: int, frictional: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code."""
 
     @cached_njit(error_model="numpy", fastmath=FUSED)
@@ -209,7 +209,7 @@ def make_advance(cohesive: bool, frictional: bool) -> Callable[..., tuple[int, b
         for done in range(steps):
             place_images(bodies, motion, frictional)
             _clear(bodies, frictional)
-            kernels.pair_forces(0, bodies, pairs, law, time_step, cohesive, frictional)
+            kernels.pair_forces(0, bodies, pairs, law, time_step, attraction, frictional)
             pressure = _trace(bodies) / (3.0 * box[0] ** 3)
             gather(bodies, motion, frictional)
             box[1] = servo.fastest * min(max((pressure - servo.stress) / servo.stress, -1.0), 1.0)
@@ -233,11 +233,11 @@ def _contact_force(
     pairs: kernels.Pairs,
     law: kernels.Law,
     alone: kernels.Bodies,
-    cohesive: bool,
+    attraction: int,
     frictional: bool,
 ) -> float:
     """Magnitude of the force in one contact, N: the law applied to its two spheres ``alone``."""
-    literally(cohesive), literally(frictional)
+    literally(attraction), literally(frictional)
     j = pairs.neighbour[pair] & kernels.INDEX_MASK
     alone.state[0], alone.state[1] = bodies.state[i], bodies.state[j]
     if frictional:
@@ -250,13 +250,13 @@ def _contact_force(
         spring[0] = pairs.spring[pair]
     which = np.zeros(1, dtype=np.uint32)
     lone = kernels.Pairs(np.array([0, 1]), here, one, other, constants, spring, one, other, constants, which)
-    kernels.pair_forces(0, alone, lone, law, 0.0, cohesive, frictional)
+    kernels.pair_forces(0, alone, lone, law, 0.0, attraction, frictional)
     force = alone.force[0, 0]
     return math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
 
 
 @cache
-def make_measure(cohesive: bool, frictional: bool) -> Callable[..., Averages]:
+def make_measure(attraction: int, frictional: bool) -> Callable[..., Averages]:
     """Compile the averages for one kind of scene."""
 
     @cached_njit(error_model="numpy", fastmath=FUSED)
@@ -275,7 +275,7 @@ def make_measure(cohesive: bool, frictional: bool) -> Callable[..., Averages]:
                 apart = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
                 if apart >= touching:
                     continue
-                total += _contact_force(i, p, bodies, pairs, law, alone, cohesive, frictional)
+                total += _contact_force(i, p, bodies, pairs, law, alone, attraction, frictional)
                 contacts += 1
                 overlap += 1.0 - apart / touching
                 for a in range(3):

@@ -1,4 +1,4 @@
-"""Closed forms of the Hertz + SJKR contact: what the contact law says before any packing is run.
+"""Closed forms of the Hertz contact with SJKR cohesion or with adhesion: what the law says before any packing is run.
 
 Every function is in SI units. ``cohesion`` is the cohesion energy density s in J/m3, ``density`` the crystal's.
 Sources: paper eqs. 6-9; SJKR closed forms derived from eq. 6 with area ``A -> 2 pi R* d`` at small overlap.
@@ -86,6 +86,37 @@ def cohesion_of_strength(strength: float, youngs_modulus: float, poisson_ratio: 
     return math.cbrt(24.0 / math.pi**3 * strength * modulus**2)
 
 
+def adhesive_force(adhesion: float, radius_i: float, radius_j: float) -> float:
+    """Constant attraction of two spheres that touch, and their pull-off force, N: ``1.5 pi W R*``.
+
+    The force of a contact is Hertz's less this, from the first touch to the last, and nothing across a gap: DMT's form
+    (Derjaguin, Muller & Toporov 1975) with the pull-off of JKR (Johnson, Kendall & Roberts 1971); DMT's own is
+    ``2 pi W R*``. Kept of JKR is the pull-off, hence how it depends on the sizes. Left out are the neck, which holds
+    spheres that draw apart across a gap, with it the hysteresis (making and breaking a contact costs no energy but the
+    damping's), and that adhesion changes the stiffness. All this happens within overlaps and gaps of the order of
+    :func:`adhesive_overlap`; where they vanish against the spheres, in the rigid limit, so does the difference at rest.
+    As with SJKR, the Coulomb limit is mu times the repulsive part alone: without load mu times this force, where SJKR
+    has mu times 27/4 of its pull-off.
+
+    Parameters
+    ----------
+    adhesion : float
+        Work of adhesion W, J/m2.
+    radius_i, radius_j : float
+        Radii, m.
+    """
+    return 1.5 * math.pi * adhesion * effective_radius(radius_i, radius_j)
+
+
+def adhesive_overlap(
+    adhesion: float, youngs_modulus: float, poisson_ratio: float, radius_i: float, radius_j: float
+) -> float:
+    """Overlap at which Hertz repulsion balances adhesion, m: ``(3 F / (4 E* sqrt(R*)))^(2/3)`` with its force F."""
+    modulus = effective_modulus(youngs_modulus, poisson_ratio)
+    root = math.sqrt(effective_radius(radius_i, radius_j))
+    return math.cbrt(0.75 * adhesive_force(adhesion, radius_i, radius_j) / (modulus * root)) ** 2
+
+
 def adhesive_strength(adhesion: float, diameter: float) -> float:
     """Stress that a surface's work of adhesion W holds, Pa: ``(3 pi / 8) W / d``.
 
@@ -99,6 +130,14 @@ def adhesive_strength(adhesion: float, diameter: float) -> float:
         Diameter of the spheres, m.
     """
     return 3.0 * math.pi / 8.0 * adhesion / diameter
+
+
+def adhesion_of_strength(strength: float, diameter: float) -> float:
+    """Work of adhesion that holds a stress (Pa) between spheres of a diameter (m), J/m2.
+
+    The inverse of :func:`adhesive_strength`.
+    """
+    return 8.0 / (3.0 * math.pi) * strength * diameter
 
 
 def effective_shear_modulus(youngs_modulus: float, poisson_ratio: float) -> float:

@@ -21,6 +21,8 @@ LARGEST_LOAD: Final = 3e-4
 """Stress over E* up to which spheres count as rigid."""
 LARGEST_STRENGTH: Final = 1e-5
 """Stress that adhesion holds over E* up to which spheres count as rigid."""
+ROUNDING: Final = 1e-9
+"""Share by which a limit may be exceeded: a strength that was computed by way of a cohesion."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,9 @@ class Similar:
         Simulated stress, Pa.
     cohesion : float
         Simulated cohesion energy density, J/m3.
+    adhesion : float
+        Simulated work of adhesion, J/m2, of the same strength between spheres of the diameter given: the real one times
+        ``scale``. NaN without a diameter. A cell takes the one or the other.
     strength : float
         Stress that the real contacts hold, p_c, Pa.
     load_over_strength : float
@@ -49,6 +54,7 @@ class Similar:
     youngs_modulus: float
     stress: float
     cohesion: float
+    adhesion: float
     strength: float
     load_over_strength: float
     load_over_modulus: float
@@ -60,6 +66,7 @@ def similar(
     *,
     poisson_ratio: float = 0.2,
     strength: float = 0.0,
+    diameter: float | None = None,
     simulated_modulus: float = SIMULATED_MODULUS,
 ) -> Similar:
     """Scale a real crystal under a real pressure to one that can be computed.
@@ -75,6 +82,8 @@ def similar(
     strength : float
         Stress that the real contacts hold, Pa: :func:`strength_of_adhesion` or
         :func:`filtercake.packing.contact_law.cohesive_strength`.
+    diameter : float, optional
+        Diameter of the spheres that hold it, best the Sauter mean, m; for the adhesion alone.
     simulated_modulus : float
         Young's modulus that is simulated, Pa.
 
@@ -92,6 +101,8 @@ def similar(
             raise CellError(f"{name} = {value:g} Pa: must be a finite number above 0")
     if not (math.isfinite(strength) and strength >= 0.0):
         raise CellError(f"strength = {strength:g} Pa: must be a finite number, 0 or above")
+    if diameter is not None:
+        _check_diameter(diameter)
     if not 0.0 <= poisson_ratio <= 0.5:
         raise CellError(f"poisson_ratio = {poisson_ratio:g}: must be 0 to 0.5")
     modulus = contact_law.effective_modulus(youngs_modulus, poisson_ratio)
@@ -102,6 +113,7 @@ def similar(
         simulated_modulus,
         scale * pressure,
         contact_law.cohesion_of_strength(scale * strength, simulated_modulus, poisson_ratio),
+        math.nan if diameter is None else contact_law.adhesion_of_strength(scale * strength, diameter),
         strength,
         pressure / strength if strength > 0.0 else math.inf,
         pressure / modulus,
@@ -111,14 +123,18 @@ def similar(
 def strength_of_adhesion(adhesion: float, diameter: float) -> float:
     """Stress that a real surface's work of adhesion (J/m2) holds between spheres of a diameter (m), Pa.
 
-    The forces of sizes far from ``diameter``, best the Sauter mean, are not those of JKR: the simulated pull-off grows
-    with the square of the size, the real one with the size.
+    A cell with adhesion has JKR's pull-off between all sizes. One with cohesion of this strength has it at this
+    diameter alone, best the Sauter mean: its pull-off grows with the square of the size, the real one with the size.
     """
     if not (math.isfinite(adhesion) and adhesion >= 0.0):
         raise CellError(f"adhesion = {adhesion:g} J/m2: must be a finite number, 0 or above")
+    _check_diameter(diameter)
+    return contact_law.adhesive_strength(adhesion, diameter)
+
+
+def _check_diameter(diameter: float) -> None:
     if not (math.isfinite(diameter) and diameter > 0.0):
         raise CellError(f"diameter = {diameter:g} m: must be a finite number above 0")
-    return contact_law.adhesive_strength(adhesion, diameter)
 
 
 def check_rigid(stress: float, strength: float, modulus: float) -> None:
@@ -137,7 +153,7 @@ def check_rigid(stress: float, strength: float, modulus: float) -> None:
         With the value and what is allowed.
     """
     for name, value, limit in (("stress", stress, LARGEST_LOAD), ("strength", strength, LARGEST_STRENGTH)):
-        if not value <= limit * modulus:
+        if not value <= limit * modulus * (1.0 + ROUNDING):
             raise CellError(
                 f"{name} = {value:.4g} Pa, {value / modulus:.2g} of E* = {modulus:.4g} Pa: must be at most {limit:g} "
                 f"of it, {limit * modulus:.4g} Pa (the limit of rigid spheres)"

@@ -143,7 +143,33 @@ def test_cohesion_of_a_strength_is_the_inverse(s: float, youngs: float, poisson:
 
 def test_adhesive_strength_by_hand() -> None:
     # pull-off 1.5 pi 0.01 J/m2 5 um = 0.2356 uN over (20 um)^2
+    assert contact_law.adhesive_force(0.01, 10e-6, 10e-6) == pytest.approx(0.23562e-6, rel=1e-5)
     assert contact_law.adhesive_strength(0.01, 20e-6) == pytest.approx(589.05, rel=1e-5)
+
+
+adhesions = st.floats(1e-5, 1.0)
+
+
+@given(adhesions, radii)
+def test_adhesion_of_a_strength_is_the_inverse(w: float, r: float) -> None:
+    strength = contact_law.adhesive_strength(w, 2.0 * r)
+    assert contact_law.adhesion_of_strength(strength, 2.0 * r) == pytest.approx(w, rel=1e-12)
+    assert contact_law.adhesive_force(w, r, r) == pytest.approx(strength * (2.0 * r) ** 2, rel=1e-12)
+
+
+@given(adhesions, radii, radii)
+def test_adhesive_force_goes_as_the_effective_radius(w: float, a: float, b: float) -> None:
+    force = contact_law.adhesive_force(w, a, b)
+    assert force / contact_law.adhesive_force(w, a, a) == pytest.approx(2.0 * b / (a + b), rel=1e-12)
+
+
+@given(adhesions, moduli, poissons, radii, radii)
+def test_adhesive_overlap_balances_hertz(w: float, modulus: float, nu: float, a: float, b: float) -> None:
+    star, radius = contact_law.effective_modulus(modulus, nu), contact_law.effective_radius(a, b)
+    overlap = contact_law.adhesive_overlap(w, modulus, nu, a, b)
+    assert 4.0 / 3.0 * star * math.sqrt(radius) * overlap**1.5 == pytest.approx(
+        contact_law.adhesive_force(w, a, b), rel=1e-12
+    )
 
 
 @given(moduli, poissons)

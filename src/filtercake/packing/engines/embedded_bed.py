@@ -126,7 +126,8 @@ class Bed:
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
         self.listed_at = 0  # step of the last listing
-        self.kernel = kernels.make_advance(scene.cohesion > 0.0, self.frictional, threads > 1)
+        attraction = kernels.COHESION if scene.cohesion > 0.0 else kernels.NO_ATTRACTION
+        self.kernel = kernels.make_advance(attraction, self.frictional, threads > 1)
         self.find_pairs = kernels.make_find_pairs(threads > 1)
 
     @classmethod

@@ -179,7 +179,7 @@ class Law(NamedTuple):
     """What of the equations of motion is the same for all spheres and steps; SI.
 
     ``shear_stiffness`` and ``shear_damping`` are the tangential constants over the normal ones, ``length`` is the
-    side of the periodic box.
+    side of the periodic box. ``cohesion`` is SJKR's energy density, J/m3, ``adhesion`` the work of adhesion, J/m2.
     """
 
     gravity: float
@@ -189,7 +189,11 @@ class Law(NamedTuple):
     shear_damping: float
     length: float
     time_step: float
+    adhesion: float = 0.0
 
+
+# kinds of attraction
+NO_ATTRACTION, COHESION, ADHESION = range(3)
 
 # columns of the state
 X, Y, Z, RADIUS, U, V, W, MASS = range(8)
@@ -512,14 +516,14 @@ def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
 
 @_compiled
 def pair_forces(
-    part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, cohesive: bool, frictional: bool
+    part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, attraction: int, frictional: bool
 ) -> None:
     """Add the forces and torques of the pairs of one part's spheres to its layers."""
-    literally(cohesive), literally(frictional)  # compiled for each kind: what it doesn't need is not in its code
+    literally(attraction), literally(frictional)  # compiled for each kind: what it doesn't need is not in its code
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[part], bodies.torque[part]
     last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
     spring, pair, length = pairs.spring, pairs.near_pair, law.length
-    lens_factor = 0.25 * math.pi * law.cohesion
+    lens_factor, pull_factor = 0.25 * math.pi * law.cohesion, 1.5 * math.pi * law.adhesion
     begin, end = pairs.bounds[part], pairs.bounds[part + 1]
     stop = pairs.first[begin] if begin < end else np.uint64(0)
     for i in range(begin, end):
@@ -546,9 +550,11 @@ def pair_forces(
             normal_speed = (du * dx + dv * dy + dw * dz) * inverse
             normal = constants[q, STIFFNESS] * overlap * root - constants[q, DAMPING] * quarter * normal_speed
             push = normal
-            if cohesive:
+            if attraction == COHESION:
                 lens = overlap * (total + r) * (square - (ri - rj) * (ri - rj))
                 push -= lens_factor * lens * (inverse * inverse)
+            if attraction == ADHESION:
+                push -= pull_factor * (ri * rj / total)
             push *= inverse
             gx, gy, gz = push * dx, push * dy, push * dz
             if frictional:
@@ -597,9 +603,11 @@ def pair_forces(
 
 
 @_compiled
-def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, cohesive: bool, frictional: bool) -> None:
-    """Add the floor's forces and torques to the total."""
-    literally(cohesive), literally(frictional)
+def _floor_forces(
+    floor: Floor, bodies: Bodies, law: Law, spring_step: float, attraction: int, frictional: bool
+) -> None:
+    """Add the floor's forces and torques to the total; it may be cohesive, not adhesive."""
+    literally(attraction), literally(frictional)
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     constants, spring, grounded = floor.constants, floor.spring, floor.grounded
     for k in range(grounded.size):
@@ -614,7 +622,7 @@ def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, co
         quarter = math.sqrt(root)
         normal = constants[i, STIFFNESS] * overlap * root - constants[i, DAMPING] * quarter * state[i, W]
         force[i, 2] += normal
-        if cohesive:
+        if attraction == COHESION:
             force[i, 2] -= math.pi * law.cohesion * overlap * (radius + z)
         if frictional:
             arm = z + 0.5 * overlap
@@ -682,7 +690,7 @@ def _disturbed(state: FloatArray, watched: IntArray) -> bool:
 
 
 @cache
-def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
+def make_advance(attraction: int, frictional: bool, threaded: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
 
     A threaded loop gives each thread a share of the pairs and a force buffer of its own. It binds plain numbers
@@ -725,11 +733,11 @@ def make_advance(cohesive: bool, frictional: bool, threaded: bool) -> Callable[.
                         _pick_near(t, state, pairs, patches, law)
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
-                    pair_forces(t, bodies, pairs, law, spring_step, cohesive, frictional)
+                    pair_forces(t, bodies, pairs, law, spring_step, attraction, frictional)
                 if parts > 1:
                     for t in prange(parts):
                         _add_layers(t, bodies, frictional)
-                _floor_forces(floor, bodies, law, spring_step, cohesive, frictional)
+                _floor_forces(floor, bodies, law, spring_step, attraction, frictional)
                 ready = True
             if done == steps:
                 return done, ready
