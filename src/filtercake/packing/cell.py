@@ -11,24 +11,34 @@ are corrected to rigid spheres.
 
 from __future__ import annotations
 
+import json
 import math
 import time
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.errors import CellError
+from filtercake.errors import CellError, TimeLimitReached
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import class_radii, place_spheres
+from filtercake.packing.result import publish
 from filtercake.packing.similarity import LARGEST_LOAD, check_rigid
 from filtercake.units import FloatArray
 
 if TYPE_CHECKING:
     from filtercake.packing.cell_box import CellBox
 
+Report = Callable[[str], None]
+
+STATE_SECONDS: Final = 60.0
+"""Time between two states that are kept of a long run."""
+PROGRESS_SECONDS: Final = 20.0
+"""Time between two lines about a long run."""
 CHECK_STEPS: Final = 500
 """Time steps between two looks at the cell."""
 WINDOW_STEPS: Final = 4000
@@ -217,6 +227,11 @@ class Look:
     overlap: float
     force_ratio: float
 
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Look:
+        """Build a look from its plain values."""
+        return cls(**{**values, "stress": np.array(values["stress"], dtype=np.float64)})
+
     @property
     def pressure(self) -> float:
         """Mean normal stress, Pa."""
@@ -306,43 +321,138 @@ def press_along(scene: CellScene, stresses: Sequence[float]) -> list[PressedCell
     return press_through([replace(scene, stress=stress) for stress in stresses])
 
 
-def press_through(stages: Sequence[CellScene]) -> list[PressedCell]:
+def press_through(
+    stages: Sequence[CellScene],
+    *,
+    state_file: Path | None = None,
+    time_limit: float = 0.0,
+    progress: Report = lambda _: None,
+) -> list[PressedCell]:
     """Lead one cell through scenes that differ in stress and attraction only, to rest in each.
 
     At rest only their ratio counts, so that a weaker cohesion or adhesion under the same stress is a higher load.
 
+    Parameters
+    ----------
+    stages : sequence of CellScene
+        The scenes.
+    state_file : Path, optional
+        Keeps the state of a long run, which goes on from there, to the last bit, when it was stopped.
+    time_limit : float
+        Wall-clock limit, s, with what was spent before; 0 for none.
+    progress : callable
+        Receives a line now and then.
+
     Raises
     ------
     CellError, CloudError, EngineError
-        As :func:`press`.
+        As :func:`press`; EngineError also when the time limit is reached.
     """
-    # who plans a study need not wait for the compiler
-    from filtercake.packing.cell_box import CellBox
-
-    scene = stages[0]
-    side = (scene.solids / (1.0 - scene.void_fraction)) ** (1.0 / 3.0)
-    box = CellBox(scene, place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
-    found: list[PressedCell] = []
-    for stage in stages:
-        box.lead_to(stage)
-        found.append(_rest(box))
-        if not found[-1].accepted:
-            break
-    return found
+    return _Run(stages, state_file, time_limit, progress).finish()
 
 
-def _rest(box: CellBox) -> PressedCell:
-    """Advance a cell until it is at rest under its stress, or patience ends."""
-    scene, started, end = box.scene, time.monotonic(), box.step + box.scene.patience
-    first, looks = box.step, [box.look()]
-    while unrest(scene, looks) and box.step < end:
-        box.advance(min(CHECK_STEPS, end - box.step))
-        looks.append(box.look())
-    position = box.positions()
-    reasons = (*unrest(scene, looks), *refusals(scene, looks[-1], position, box.length))
-    return PressedCell(
-        position, scene.radius, box.length, looks[-1], box.step - first, time.monotonic() - started, reasons
-    )
+class _Run:
+    """A cell on its way through its scenes, with what it must remember to go on."""
+
+    def __init__(self, stages: Sequence[CellScene], state_file: Path | None, time_limit: float, progress: Report):
+        """Start from the cloud, or from the state file where it holds a state of this cell."""
+        self.stages, self.state_file, self.time_limit, self.progress = stages, state_file, time_limit, progress
+        self.found: list[PressedCell] = []
+        self.before, self.started = 0.0, time.monotonic()
+        self.saved = self.reported = self.started
+        self.box = self._fresh()
+        self.first, self.looks = 0, [self.box.look()]
+        self._resume()
+
+    @property
+    def spent(self) -> float:
+        """Wall time so far, s."""
+        return self.before + time.monotonic() - self.started
+
+    def finish(self) -> list[PressedCell]:
+        """Lead the cell through the scenes that are left."""
+        while len(self.found) < len(self.stages):
+            self._rest()
+            if not self.found[-1].accepted:
+                break
+            if len(self.found) < len(self.stages):
+                self.box.lead_to(self.stages[len(self.found)])
+                self.first, self.looks = self.box.step, [self.box.look()]
+        return self.found
+
+    def _rest(self) -> None:
+        """Advance the cell until it is at rest under its stress, or patience ends."""
+        box, scene, since = self.box, self.box.scene, self.spent
+        end = self.first + scene.patience
+        while unrest(scene, self.looks) and box.step < end:
+            box.advance(min(CHECK_STEPS, end - box.step))
+            self.looks = [*self.looks, box.look()][-1 - WINDOW_STEPS // CHECK_STEPS :]
+            self._watch()
+        position, last = box.positions(), self.looks[-1]
+        reasons = (*unrest(scene, self.looks), *refusals(scene, last, position, box.length))
+        steps, spent = box.step - self.first, self.spent - since
+        self.found.append(PressedCell(position, scene.radius, box.length, last, steps, spent, reasons))
+
+    def _watch(self) -> None:
+        """Stop at the time limit; save and report now and then."""
+        now = time.monotonic()
+        if 0.0 < self.time_limit < self.spent:
+            self._save()
+            raise TimeLimitReached(self.time_limit)
+        if now - self.saved > STATE_SECONDS:
+            self._save()
+        if now - self.reported > PROGRESS_SECONDS:
+            self.reported, last = now, self.looks[-1]
+            self.progress(
+                f"load {len(self.found) + 1} of {len(self.stages)}, step {self.box.step:,}: "
+                f"porosity {last.rigid_porosity:.4f}, force ratio {last.force_ratio:.1g}"
+            )
+
+    def _fresh(self) -> CellBox:
+        # who plans a study need not wait for the compiler
+        from filtercake.packing.cell_box import CellBox
+
+        scene = self.stages[0]
+        side = (scene.solids / (1.0 - scene.void_fraction)) ** (1.0 / 3.0)
+        return CellBox(scene, place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
+
+    def _save(self) -> None:
+        self.saved = time.monotonic()
+        if self.state_file is None:
+            return
+        past = {f"position_{k}": cell.position for k, cell in enumerate(self.found)}
+        plain = {
+            "first": self.first,
+            "spent": self.spent,
+            "looks": [_plain(look) for look in self.looks],
+            "found": [[cell.length, _plain(cell.last), cell.steps, cell.wall_time] for cell in self.found],
+        }
+        with publish(self.state_file) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, plain=json.dumps(plain), **past, **self.box.saved())
+
+    def _resume(self) -> None:
+        """Go on from the state file; one that cannot be read, or is of another cell, is passed over."""
+        if self.state_file is None or not self.state_file.exists():
+            return
+        try:
+            with np.load(self.state_file) as data:
+                plain = json.loads(str(data["plain"]))
+                self.found = [
+                    PressedCell(data[f"position_{k}"], self.stages[k].radius, length, Look.of(last), steps, spent, ())
+                    for k, (length, last, steps, spent) in enumerate(plain["found"])
+                ]
+                self.box.lead_to(self.stages[len(self.found)])
+                self.box.restore({name: data[name] for name in data.files})
+            self.first, self.before = int(plain["first"]), float(plain["spent"])
+            self.looks = [Look.of(values) for values in plain["looks"]]
+            self.progress(f"resumed at load {len(self.found) + 1} of {len(self.stages)}, step {self.box.step:,}")
+        except (OSError, EOFError, ValueError, KeyError, IndexError, TypeError, zipfile.BadZipFile):
+            self.box, self.found, self.first, self.before = self._fresh(), [], 0, 0.0
+            self.looks = [self.box.look()]
+
+
+def _plain(look: Look) -> dict[str, Any]:
+    return {**vars(look), "stress": look.stress.tolist()}
 
 
 def unrest(scene: CellScene, looks: list[Look]) -> list[str]:

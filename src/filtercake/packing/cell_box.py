@@ -6,7 +6,8 @@ on top; then every image that a pair needs becomes a row of its own behind the s
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,8 @@ SKIN_DIAMETERS: Final = (0.06, 1.0)
 """Narrowest and widest neighbour skin, over the smallest diameter."""
 LISTING_STEPS: Final = 250
 """Time steps that a list of pairs should last."""
+_STATE_ARRAYS: Final = ("spheres", "velocity", "spin", "drag", "identity", "level", "box")
+_LISTED: Final = ("first", "last", "neighbour", "spring")
 LEAST_SIDES: Final = 2.0
 """Side of the box over the largest diameter and the skin: any two spheres touch at one image only."""
 
@@ -114,6 +117,35 @@ class CellBox:
             if worn:
                 self._list_pairs()
 
+    def saved(self) -> dict[str, Any]:
+        """Everything that decides how the cell goes on, to the last bit."""
+        arrays = {name: getattr(self, name) for name in _STATE_ARRAYS}
+        lists = {"owner": self.motion.owner, "shift": self.motion.shift, "reference": self.reach.reference}
+        lists |= {f"pairs_{name}": getattr(self.pairs, name) for name in _LISTED}
+        if self._partners is not None:
+            lists["partners"] = self._partners.neighbour
+        numbers = np.array([self.step, self.listed_at, self.room, self.skin, self.reach.length])
+        return {**arrays, **lists, "numbers": numbers}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from what :meth:`saved` returned for a cell of the same scene and cloud.
+
+        Raises
+        ------
+        KeyError, ValueError
+            If it is not such a state.
+        """
+        for name in _STATE_ARRAYS:
+            getattr(self, name)[...] = saved[name]
+        self.step, self.listed_at, self.room = (int(value) for value in saved["numbers"][:3])
+        self.skin = float(saved["numbers"][3])
+        self._work_on(np.array(saved["owner"]), np.array(saved["shift"]), *(saved[f"pairs_{name}"] for name in _LISTED))
+        if self.frictional:
+            self._partners = self.pairs._replace(neighbour=np.array(saved["partners"]))
+        self.reach = cell_kernels.Reach(
+            np.array(saved["reference"]), float(saved["numbers"][4]), self.skin, self.widest
+        )
+
     def look(self) -> Look:
         """Take the averages of the present state."""
         found = self.averages(self.bodies, self.motion, self.pairs, self.law)
@@ -206,20 +238,34 @@ class CellBox:
         shift = np.column_stack([code % 3, code // 3 % 3, code // 9]) - 1.0
         bounds = np.searchsorted(found.first[by_first], np.arange(n + 1)).astype(np.uint64)
         same = np.uint32(kernels.SAME_IMAGE) << kernels.IMAGE_SHIFT
-        self.motion = cell_kernels.Motion(self.velocity, self.drag, owner, shift, self.box)
-        rows = np.concatenate([np.arange(n), owner])
-        layers = (1, rows.size, 3)
-        self.bodies = kernels.Bodies(self.spheres[rows], self.spin[rows], np.zeros(layers), np.zeros(layers))
-        self.pairs = _pairs(bounds[:-1], bounds[1:], row.astype(np.uint32) | same, self.frictional)
-        kernels.pair_constants(
-            self.bodies.state, self.pairs, self.scene.modulus, contact_law.damping_ratio(self.scene.restitution)
-        )
+        self._work_on(owner, shift, bounds[:-1], bounds[1:], row.astype(np.uint32) | same, None)
         if self.frictional:
             partners = self.pairs._replace(neighbour=second.astype(np.uint32))
             if self._partners is not None:
                 kernels.carry_springs(order, self._partners, partners)
             self._partners = partners
         self.reach = cell_kernels.Reach(self.spheres[:, :3].copy(), self.length, self.skin, self.widest)
+
+    def _work_on(
+        self,
+        owner: IntArray,
+        shift: FloatArray,
+        first: kernels.Unsigned,
+        last: kernels.Unsigned,
+        neighbour: kernels.Neighbours,
+        spring: FloatArray | None,
+    ) -> None:
+        """Make what the time loop works on, with springs that are there already."""
+        rows = np.concatenate([np.arange(self.identity.size), owner])
+        layers = (1, rows.size, 3)
+        self.motion = cell_kernels.Motion(self.velocity, self.drag, owner, shift, self.box)
+        self.bodies = kernels.Bodies(self.spheres[rows], self.spin[rows], np.zeros(layers), np.zeros(layers))
+        self.pairs = _pairs(first, last, neighbour, self.frictional)
+        if spring is not None:
+            self.pairs.spring[...] = spring
+        kernels.pair_constants(
+            self.bodies.state, self.pairs, self.scene.modulus, contact_law.damping_ratio(self.scene.restitution)
+        )
 
 
 def _wrapped(position: FloatArray, length: float) -> FloatArray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -88,7 +89,9 @@ def _variable(load: FloatArray) -> FloatArray:
     return np.asarray(load**-0.25)
 
 
-def press_cake(scene: Scene, replicate: int, seed: int, progress: Report = lambda _: None) -> Packing:
+def press_cake(
+    scene: Scene, replicate: int, seed: int, progress: Report = lambda _: None, state_file: Path | None = None
+) -> Packing:
     """Make one pressed packing: a periodic cell at the last load, with the porosities at all loads in its record.
 
     Parameters
@@ -98,7 +101,9 @@ def press_cake(scene: Scene, replicate: int, seed: int, progress: Report = lambd
     replicate, seed : int
         Number of the replicate, and the seed of its cloud.
     progress : callable
-        Receives a line per load.
+        Receives a line now and then.
+    state_file : Path, optional
+        Keeps the state of a long run.
 
     Raises
     ------
@@ -108,11 +113,15 @@ def press_cake(scene: Scene, replicate: int, seed: int, progress: Report = lambd
         If the cell does not come to rest at a load, or is not acceptable.
     """
     loads = LOADS if scene.attraction != "none" else LOADS[-1:]
-    found = press_through(stages(scene, loads, seed))
+    found = press_through(
+        stages(scene, loads, seed),
+        state_file=state_file,
+        time_limit=scene.time_limit,
+        progress=lambda line: progress(f"r{replicate}: {line}"),
+    )
     last = found[-1]
     if not last.accepted:
         raise PackingRejected([f"load {loads[len(found) - 1]:g}: {reason}" for reason in last.reasons])
-    progress(f"r{replicate}: porosity {last.last.rigid_porosity:.4f} after {sum(cell.steps for cell in found):,} steps")
     record = {**_measurements(found, loads), "replicate": replicate, "seed": seed, "scene": scene.as_dict()}
     return Packing(last.position, last.radius, last.length, record)
 
@@ -141,7 +150,7 @@ def stages(scene: Scene, loads: Sequence[float], seed: int) -> list[CellScene]:
 def _attraction(scene: Scene, cell: CellScene, strength: float) -> dict[str, Any]:
     """Choose what makes a cell's contacts hold a stress (Pa)."""
     if scene.attraction == "adhesion":
-        return {"adhesion": strength / contact_law.adhesive_strength(1.0, cell.sauter_mean)}
+        return {"adhesion": contact_law.adhesion_of_strength(strength, cell.sauter_mean)}
     return {"cohesion": contact_law.cohesion_of_strength(strength, cell.youngs_modulus, cell.poisson_ratio)}
 
 

@@ -99,7 +99,7 @@ def pack(
         If the spheres cannot be placed, the engine fails, or its result is not acceptable.
     """
     if scene.is_pressed:
-        return press_cake(scene, replicate, cloud_seed(scene, replicate), progress)
+        return press_cake(scene, replicate, cloud_seed(scene, replicate), progress, state_file)
     settled = settle(scene, replicate, folder, engine=engine, progress=progress, state_file=state_file)
     state = settled.state
     diagnostics = {

@@ -377,8 +377,8 @@ def _bed_problems(model: Study, csds: dict[str, LoadedCsd], file: str) -> Iterab
         )
         if needed > MOST_PARTICLES:
             allowed = (
-                f"needs {needed:.3g} spheres for a bed deep or a cell wide enough; at most {MOST_PARTICLES} are possible: leave "
-                "small crystals out of the packing (truncate_below_um), or give packing.particles"
+                f"needs {needed:.3g} spheres for a bed deep or a cell wide enough; at most {MOST_PARTICLES} are "
+                "possible: leave small crystals out of the packing (truncate_below_um), or give packing.particles"
             )
             yield Problem(file, *_source_of(name, model.csds[name]), allowed)
 

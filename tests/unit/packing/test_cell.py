@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
-from filtercake.errors import CellError, CloudError, EngineError
+from filtercake.errors import CellError, CloudError, EngineError, TimeLimitReached
 from filtercake.packing import contact_law
 from filtercake.packing.cell import (
     ANISOTROPY_LIMIT,
@@ -612,3 +614,48 @@ def test_adhesions_and_diameters_that_make_no_sense_are_refused() -> None:
     with pytest.raises(CellError, match=r"diameter = 0 m"):
         strength_of_adhesion(1e-2, 0.0)
     check_rigid(LARGEST_LOAD * E_STAR, LARGEST_STRENGTH * E_STAR, E_STAR)
+
+
+class TestGoingOn:
+    """A run that is stopped again and again, and one that never is."""
+
+    @pytest.mark.parametrize("friction", [0.0, 0.3])
+    def test_is_the_same_to_the_last_bit(self, tmp_path: Path, friction: float) -> None:
+        stages = stages_of(friction)
+        whole, state = press_through(stages), tmp_path / "state.npz"
+        said: list[str] = []
+        for _ in range(200):
+            try:
+                # enough for a few looks beyond what was spent before
+                limit = spent_in(state) + 0.05
+                parts = press_through(stages, state_file=state, time_limit=limit, progress=said.append)
+                break
+            except TimeLimitReached:
+                assert state.exists()
+        else:
+            pytest.fail("the run never ended")
+        assert any(line.startswith("resumed at load") for line in said)
+        for one, other in zip(whole, parts, strict=True):
+            assert (one.steps, one.length) == (other.steps, other.length)
+            assert np.array_equal(one.position, other.position)
+            assert np.array_equal(one.last.stress, other.last.stress)
+
+    def test_a_damaged_state_is_passed_over(self, tmp_path: Path) -> None:
+        stages, state = stages_of(0.0)[:1], tmp_path / "state.npz"
+        with pytest.raises(TimeLimitReached):
+            press_through(stages, state_file=state, time_limit=1e-9)
+        state.write_bytes(state.read_bytes()[:1000])
+        (one,), (other,) = press_through(stages, state_file=state), press_through(stages)
+        assert np.array_equal(one.position, other.position)
+
+
+def stages_of(friction: float) -> list[CellScene]:
+    first = scene_of(HALVES, 60, stress=9e-6 * E_STAR, friction=friction, adhesive_x=1.0)
+    return [first, replace(first, stress=4.0 * first.stress, adhesion=0.0)]
+
+
+def spent_in(state: Path) -> float:
+    if not state.exists():
+        return 0.0
+    with np.load(state) as data:
+        return float(json.loads(str(data["plain"]))["spent"])
