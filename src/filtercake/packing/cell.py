@@ -420,7 +420,7 @@ class _Run:
         self.saved = time.monotonic()
         if self.state_file is None:
             return
-        past = {f"position_{k}": cell.position for k, cell in enumerate(self.found)}
+        past: dict[str, Any] = {f"position_{k}": cell.position for k, cell in enumerate(self.found)}
         plain = {
             "first": self.first,
             "spent": self.spent,

@@ -650,7 +650,7 @@ class TestGoingOn:
 
 
 def stages_of(friction: float) -> list[CellScene]:
-    first = scene_of(HALVES, 60, stress=9e-6 * E_STAR, friction=friction, adhesive_x=1.0)
+    first = scene_of(HALVES, 150, stress=9e-6 * E_STAR, friction=friction, adhesive_x=1.0)
     return [first, replace(first, stress=4.0 * first.stress, adhesion=0.0)]
 
 
