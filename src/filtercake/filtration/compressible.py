@@ -19,7 +19,7 @@ import numpy as np
 
 from filtercake.units import FloatArray
 
-POINTS_PER_DECADE: Final = 60
+POINTS_PER_DECADE: Final = 120
 """Loads at which a cake is cut."""
 
 PorosityOfLoad = Callable[[FloatArray], FloatArray]

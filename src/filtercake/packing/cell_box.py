@@ -120,7 +120,11 @@ class CellBox:
     def saved(self) -> dict[str, Any]:
         """Everything that decides how the cell goes on, to the last bit."""
         arrays = {name: getattr(self, name) for name in _STATE_ARRAYS}
-        lists: dict[str, Any] = {"owner": self.motion.owner, "shift": self.motion.shift, "reference": self.reach.reference}
+        lists: dict[str, Any] = {
+            "owner": self.motion.owner,
+            "shift": self.motion.shift,
+            "reference": self.reach.reference,
+        }
         lists |= {f"pairs_{name}": getattr(self.pairs, name) for name in _LISTED}
         if self._partners is not None:
             lists["partners"] = self._partners.neighbour

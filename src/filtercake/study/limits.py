@@ -232,18 +232,18 @@ def _pressed_refusals(scene: Scene) -> Iterator[Finding]:
             f"must be at most {LARGEST_LOAD * modulus / KILOPASCAL:.3g} kPa at {given}: above {LARGEST_LOAD:g} of E*, "
             "crystals are pressed out of shape",
         )
+    if scene.load_over_strength < LEAST_LOAD:
+        yield Finding(
+            sticks,
+            f"holds {scene.strength / KILOPASCAL:.3g} kPa, more than the pressure of {scene.pressure / KILOPASCAL:.3g} "
+            "kPa: the cake is what the way it formed has made of it; use more pressure or less attraction",
+        )
     if scene.strength > LARGEST_STRENGTH * modulus:
         yield Finding(
             sticks,
             f"holds {scene.strength / KILOPASCAL:.3g} kPa; must hold at most "
             f"{LARGEST_STRENGTH * modulus / KILOPASCAL:.3g} kPa at {given}: above {LARGEST_STRENGTH:g} of E*, contacts "
             "are pulled out of shape",
-        )
-    if scene.load_over_strength < LEAST_LOAD:
-        yield Finding(
-            sticks,
-            f"holds {scene.strength / KILOPASCAL:.3g} kPa, more than the pressure of {scene.pressure / KILOPASCAL:.3g} "
-            "kPa: the cake is what the way it formed has made of it; use more pressure or less attraction",
         )
     if scene.time_step > (SOFT_TIME_STEP + 1e-9) * scene.rayleigh_time_step:
         yield Finding("time_step", f"must be at most {SOFT_TIME_STEP:g} of the Rayleigh time step in a pressed cell")

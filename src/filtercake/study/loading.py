@@ -214,8 +214,9 @@ def check_study(values: Any, path: Path, *, packed: bool = True) -> LoadedStudy:
         raise ConfigError(problems)
     problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
     problems += _law_problems(model, str(path))
-    problems += dict.fromkeys(_protocol_problems(model, str(path)))
-    if problems:  # a scene needs a pressure
+    of_protocols = dict.fromkeys(_protocol_problems(model, str(path)))
+    problems += of_protocols
+    if of_protocols:  # a scene needs a pressure
         raise ConfigError(problems)
     csds: dict[str, LoadedCsd] = {}
     for name, csd in model.csds.items():

@@ -17,7 +17,7 @@ from filtercake.errors import CsdError
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import make_cloud
 from filtercake.packing.pack import pack_replicates
-from filtercake.packing.scene import Scene
+from filtercake.packing.scene import OF_FILTRATION, Scene
 
 MakeScene = Callable[..., Scene]
 INCIDENTAL: list[dict[str, Any]] = [{"processes": 2}, {"time_limit": 60.0}, {"write_vtk": True}]
@@ -56,7 +56,39 @@ def test_everything_else_decides(make_scene: MakeScene, name: str) -> None:
 
 
 def test_no_number_is_forgotten() -> None:
-    assert {field.name for field in dataclasses.fields(Scene)} == {*DECISIVE, *(name for c in INCIDENTAL for name in c)}
+    known = {*DECISIVE, *OF_FILTRATION, *(name for c in INCIDENTAL for name in c)}
+    assert {field.name for field in dataclasses.fields(Scene)} == known
+
+
+def test_what_only_pressed_cakes_have_decides_nothing_of_others(make_scene: MakeScene) -> None:
+    pressed = {"pressure": 1e5, "adhesion": 1e-3, "crystal_modulus": 3e9}
+    assert make_scene(**pressed) == make_scene()
+    assert not {*OF_FILTRATION} & {*make_scene().decisive()}
+    cake = make_scene(protocol="filtration", **pressed)
+    assert cake != make_scene()
+    for name, value in pressed.items():
+        assert make_scene(**{"protocol": "filtration", **pressed, name: 1.5 * value}) != cake
+
+
+def test_a_pressed_cell_serves_every_pressure_and_strength(make_scene: MakeScene) -> None:
+    def packed(**changed: Any) -> Scene:
+        given = {"protocol": "filtration", "pressure": 5e4, "adhesion": 1e-2, "crystal_modulus": 3e9, "cohesion": 0.0}
+        return make_scene(**{**given, **changed}).as_packed()
+
+    one = packed()
+    assert one == packed(pressure=2e5) == packed(adhesion=1e-4) == packed(crystal_modulus=2e10) == one.as_packed()
+    others = [
+        packed(adhesion=0.0),
+        packed(adhesion=0.0, cohesion=5e4),
+        packed(friction=0.3),
+        packed(seed=9),
+        packed(particles=999),
+        packed(restitution=0.9),
+    ]
+    assert len({one, *others}) == 7
+    # the simulated modulus is the cell's own; the step over Rayleigh's is kept
+    soft = make_scene(protocol="filtration", pressure=5e4, crystal_modulus=3e9, youngs_modulus=9e6)
+    assert soft.as_packed().rayleigh_fraction == pytest.approx(soft.rayleigh_fraction, rel=1e-12)
 
 
 def test_a_scene_survives_json_to_the_last_bit(make_scene: MakeScene) -> None:
