@@ -17,6 +17,7 @@ from filtercake.filtration.resistance import CARMAN
 from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates, point_key
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.result import read_sealed, write_json
+from filtercake.packing.scene import FILTRATION_PROTOCOL
 from filtercake.results.replicates import REPLICATE_COLUMNS, replicate_rows, summarise
 from filtercake.run.provenance import packing_code, versions
 from filtercake.study import engine_choice
@@ -25,6 +26,8 @@ from filtercake.study.points import Point, base_point
 from filtercake.units import MICROSECOND
 
 SUMMARY = "summary.json"
+PRESSURE = 50.0
+"""Pressure drop across a cake where none is given, kPa: a vacuum filter's."""
 _OWN = re.compile(rf"r\d+\..*|\.r\d+\..*|\.work|{re.escape(MANIFEST)}|{re.escape(SUMMARY)}")
 """Names that packings and their records have."""
 
@@ -82,7 +85,9 @@ def pack(
     replace : bool
         Whether packings of other options, or of another version of the program, may be lost; an error otherwise.
     **options
-        The keys of the configuration's blocks ``material`` and ``packing``.
+        The keys of the configuration's blocks ``material`` and ``packing``. Without a ``protocol`` the cake is pressed
+        as in a filter (``filtration``), at ``PRESSURE`` where no pressure is given, and without attraction where
+        neither ``adhesion_mJ_m2`` nor ``cohesion_kJ_m3`` is given; ``gravity`` drops the crystals, as the paper does.
 
     Raises
     ------
@@ -93,6 +98,10 @@ def pack(
     """
     material = {name: value for name, value in options.items() if name in Material.model_fields}
     packing = {name: value for name, value in options.items() if name not in material}
+    if packing.setdefault("protocol", FILTRATION_PROTOCOL) == FILTRATION_PROTOCOL:
+        packing.setdefault("pressure_kPa", PRESSURE)
+        if material.keys().isdisjoint({"adhesion_mJ_m2", "cohesion_kJ_m3"}):
+            material["adhesion_mJ_m2"] = 0.0
     study = load(source.options, material, packing, law)
     path, name = Path(folder), csd_name(study)
     _check_folder(path)

@@ -210,7 +210,8 @@ def _read(packing: Source) -> OwnSpheres:
 
 
 def _of_packing(packing: Packing, origin: str, density: float | None) -> OwnSpheres:
-    arrays = {"position": packing.position, "radius": packing.radius, "length": packing.length}
+    room = {"box": np.full(3, packing.length)} if packing.is_cell else {"length": packing.length}
+    arrays = {"position": packing.position, "radius": packing.radius, **room}
     return check_spheres(arrays, origin, density)
 
 

@@ -142,11 +142,11 @@ class PackingPorosity:
     Attributes
     ----------
     porosity : float
-        Exact, in the interior of the bed: the answer.
-    porosity_from_floor : float
-        Exact, from the floor up, the layer ordered by the floor included.
-    porosity_paper_count : float
-        The paper's estimate: spheres counted whole by centre.
+        Exact, in the interior of the bed: the answer. Of a pressed cell, that of rigid spheres under the last load.
+    porosity_from_floor : float or None
+        Exact, from the floor up, the layer ordered by the floor included; None without a floor.
+    porosity_paper_count : float or None
+        The paper's estimate: spheres counted whole by centre; None without a floor.
     soft_contact_compaction : float
         Estimated loss of porosity because contacts overlap.
     interior_from_um, interior_to_um, bed_height_um : float
@@ -158,8 +158,8 @@ class PackingPorosity:
     """
 
     porosity: float
-    porosity_from_floor: float
-    porosity_paper_count: float
+    porosity_from_floor: float | None
+    porosity_paper_count: float | None
     soft_contact_compaction: float
     interior_from_um: float
     interior_to_um: float
@@ -371,12 +371,13 @@ def porosity(npz: str | Path) -> PackingPorosity:
         raise PackingRejected([f"{npz}: {error}; use more particles"]) from None
     return PackingPorosity(
         porosity=found.interior,
-        porosity_from_floor=found.from_floor,
-        porosity_paper_count=found.paper_count,
+        porosity_from_floor=None if packing.is_cell else found.from_floor,
+        porosity_paper_count=None if packing.is_cell else found.paper_count,
         soft_contact_compaction=found.compaction,
         interior_from_um=found.slab.lower / MICROMETRE,
         interior_to_um=found.slab.upper / MICROMETRE,
-        bed_height_um=bed_height(packing.position, packing.radius) / MICROMETRE,
+        bed_height_um=(packing.length if packing.is_cell else bed_height(packing.position, packing.radius))
+        / MICROMETRE,
         particles=int(packing.radius.size),
         engine=scene.engine,
     )
@@ -385,14 +386,26 @@ def porosity(npz: str | Path) -> PackingPorosity:
 def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> pd.DataFrame:
     """Tabulate a packing's porosity over height, in exact slices from the floor to the topmost sphere.
 
-    The columns are height_um (of a slice's middle) and porosity; errors are those of :func:`porosity`.
+    The columns are height_um (of a slice's middle) and porosity; errors are those of :func:`porosity`. A pressed cell
+    is cut from its lower face to the upper one, with what reaches in from beyond.
     """
     packing, _ = load_packing(Path(npz))
-    top = float((packing.position[:, 2] + packing.radius).max())
+    if packing.is_cell:
+        packing = _stacked(packing)
+    top = packing.length if packing.is_cell else float((packing.position[:, 2] + packing.radius).max())
     slices = max(1, math.ceil(top * slices_per_diameter / (2.0 * float(packing.radius.max()))))
     edges = np.linspace(0.0, top, slices + 1)
     values = porosity_profile(packing.position, packing.radius, packing.length, edges)
     return pd.DataFrame({"height_um": 0.5 * (edges[1:] + edges[:-1]) / MICROMETRE, "porosity": values})
+
+
+def _stacked(packing: Packing) -> Packing:
+    """Put a cell's spheres that reach through its lower or upper face beyond the other one as well."""
+    lifts = packing.length * np.array([0.0, 1.0, -1.0])
+    position = np.concatenate([packing.position + np.array([0.0, 0.0, lift]) for lift in lifts])
+    radius = np.tile(packing.radius, lifts.size)
+    inside = (position[:, 2] + radius > 0.0) & (position[:, 2] - radius < packing.length)
+    return replace(packing, position=position[inside], radius=radius[inside])
 
 
 def load_packing(npz: Path) -> tuple[Packing, Scene]:

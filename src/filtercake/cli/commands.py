@@ -318,14 +318,21 @@ def _run_pack(options: argparse.Namespace) -> int:
         return status
     _print_lines(
         [
-            ("porosity, interior", summary["porosity"], _interval(summary["porosity_ci95"], "")),
-            ("porosity as published", summary["porosity_paper_count"], ""),
+            ("porosity", summary["porosity"], _interval(summary["porosity_ci95"], "")),
+            *_known("porosity as published", summary["porosity_paper_count"]),
+            *_known("pressure drop", summary["pressure_kPa"], "kPa"),
+            *_known("compressibility n", summary["compressibility"]),
             *_resistances(summary, _interval(summary["resistance_ci95_m_kg"], "m/kg")),
             ("packings", summary["n"], f"of {summary['particles']} spheres by {summary['engine']}"),
         ]
     )
     print(f"packings are in {options.output}")
     return status
+
+
+def _known(name: str, value: float | None, unit: str = "") -> list[Line]:
+    """Give the line of a number that not every packing has."""
+    return [] if value is None else [(name, value, unit)]
 
 
 def _resistances(found: dict[str, Any], interval: str) -> list[Line]:
@@ -360,8 +367,8 @@ def _run_porosity(options: argparse.Namespace) -> int:
         _print_lines(
             [
                 ("porosity, interior", item.porosity, ""),
-                ("porosity from the floor", item.porosity_from_floor, ""),
-                ("porosity as published", item.porosity_paper_count, ""),
+                *_known("porosity from the floor", item.porosity_from_floor),
+                *_known("porosity as published", item.porosity_paper_count),
                 ("loss by soft contacts", item.soft_contact_compaction, ""),
                 ("interior from", item.interior_from_um, "um"),
                 ("interior to", item.interior_to_um, "um"),

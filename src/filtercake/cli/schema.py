@@ -17,6 +17,7 @@ from pydantic.fields import FieldInfo
 from filtercake.calibration.config import Calibration, CohesionRange
 from filtercake.calibration.measurements import ConstantPressureTest, KnownResistance, MeasurementFile
 from filtercake.filtration.resistance import CARMAN
+from filtercake.packing.scene import FILTRATION_PROTOCOL
 from filtercake.study.config.crystals import Crystallizer, Csd, Lognormal, RosinRammler, SizeClass
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
@@ -91,7 +92,10 @@ def study_template() -> str:
         for key, field in optional.model_fields.items():
             lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")
             lines.append(f"  # {key}: {EXAMPLES.get(key) or _yaml(field.get_default())}")
-    for name, model, given in (("material", Material, {"density_kg_m3": "1180"}), ("packing", Packing, {})):
+    for name, model, given in (
+        ("material", Material, {"density_kg_m3": "1180", "adhesion_mJ_m2": "0"}),
+        ("packing", Packing, {"protocol": FILTRATION_PROTOCOL, "pressure_kPa": "50"}),
+    ):
         lines += ["", f"# {_INTRO[name]}", f"{name}:" if given else f"# {name}:"]
         for key, field in model.model_fields.items():
             lines.append(f"  # {meaning(field)} Allowed: {allowed(field)}.")

@@ -16,7 +16,6 @@ from matplotlib.patches import Circle
 from filtercake.figures import selection, style
 from filtercake.figures.selection import StudyData
 from filtercake.packing.result import Packing
-from filtercake.packing.scene import FILTRATION_PROTOCOL
 from filtercake.packing.slab import bed_height, interior_slab
 from filtercake.units import MICROMETRE, FloatArray
 
@@ -41,17 +40,12 @@ def draw(data: StudyData) -> Figure:
         return figure
     replicate, packing = found[0]
     _spheres(figure, axes, packing)
-    if not is_pressed(packing):
+    if not packing.is_cell:
         _levels(axes, packing)
     style.legend(figure, [axes], columns=3)
     what = f"replicate {replicate} of {selection.label(data, str(point['csd']))}, plane y = L/2"
     style.footer(figure, rows, what, note)
     return figure
-
-
-def is_pressed(packing: Packing) -> bool:
-    """Whether a packing is a pressed cell, periodic in all directions."""
-    return packing.diagnostics.get("protocol") == FILTRATION_PROTOCOL
 
 
 def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -70,9 +64,9 @@ def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, F
     x, z, diameter = position[cut, 0], position[cut, 2], 2.0 * radius[cut]
     parts = []
     images = (-length, 0.0, length)
-    for shift, lift in itertools.product(images, images if is_pressed(packing) else (0.0,)):
+    for shift, lift in itertools.product(images, images if packing.is_cell else (0.0,)):
         seen = (x + shift + circle > 0.0) & (x + shift - circle < length)
-        if is_pressed(packing):
+        if packing.is_cell:
             seen &= (z + lift + circle > 0.0) & (z + lift - circle < length)
         parts.append(np.column_stack([x[seen] + shift, z[seen] + lift, circle[seen], diameter[seen]]))
     found = np.concatenate(parts)
@@ -99,7 +93,7 @@ def _spheres(figure: Figure, axes: Axes, packing: Packing) -> None:
     side = packing.length / MICROMETRE
     axes.set_xlim(0.0, side)
     axes.set_aspect("equal")
-    if is_pressed(packing):
+    if packing.is_cell:
         axes.set_ylim(0.0, side)
         return
     # up to what lies on the bed: a sphere that was thrown up and has not come back would stretch the picture

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from filtercake.errors import PackingRejected
-from filtercake.packing.scene import digest
+from filtercake.packing.scene import FILTRATION_PROTOCOL, digest
 from filtercake.packing.settling import Trajectory
 from filtercake.units import FloatArray
 
@@ -89,6 +89,11 @@ class Packing:
     radius: FloatArray
     length: float
     diagnostics: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_cell(self) -> bool:
+        """Whether it is a pressed cell, periodic in all directions, instead of a bed on a floor."""
+        return self.diagnostics.get("protocol") == FILTRATION_PROTOCOL
 
     def save(self, npz: Path) -> str:
         """Write the geometry beside its diagnostics, each published whole; return the geometry's SHA-256.

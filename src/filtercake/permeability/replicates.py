@@ -14,7 +14,7 @@ from filtercake.errors import PackingRejected
 from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.result import Packing, publish, read_record, read_sealed, sealed, sha256, write_json
-from filtercake.packing.scene import FILTRATION_PROTOCOL, digest
+from filtercake.packing.scene import digest
 from filtercake.permeability.measure import Domain, bed_domain, cell_domain, solve
 from filtercake.permeability.result import Permeability, Picture
 
@@ -76,7 +76,7 @@ def solve_replicates(
 
 def _domain(packing: Packing, accuracy: float) -> Domain:
     """Take a settled bed between its floor and surface, a pressed cell whole."""
-    if packing.diagnostics.get("protocol") == FILTRATION_PROTOCOL:
+    if packing.is_cell:
         return cell_domain(packing.position, packing.radius, np.full(3, packing.length), accuracy)
     return bed_domain(packing.position, packing.radius, packing.length, accuracy)
 

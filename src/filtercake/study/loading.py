@@ -415,7 +415,9 @@ def _protocol_problems(model: Study, file: str) -> Iterable[Problem]:
             yield Problem(file, "packing.pressure_kPa", "(missing)", allowed)
     if pressed:
         if model.packing.engine not in (AUTO, Embedded.name):
-            allowed = f"cakes are pressed by the embedded engine: use {AUTO!r} or {Embedded.name!r}"
+            allowed = (
+                f"cakes are pressed by the embedded engine: use {AUTO!r} or {Embedded.name!r}, or protocol: gravity"
+            )
             yield Problem(file, "packing.engine", repr(model.packing.engine), allowed)
         return
     for key, value in (
