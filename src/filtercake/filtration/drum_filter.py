@@ -26,15 +26,27 @@ A horizontal belt filter is the same apparatus unrolled: :func:`belt`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from filtercake.errors import FilterError
+from filtercake.filtration.ranges import (
+    FRACTION,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    TURNING,
+    WHOLE_OR_LESS,
+    Values,
+    problem,
+    refuse,
+    require,
+)
 from filtercake.units import LENGTH_UNITS, MICROMETRE, FloatArray, duration
 
 WATER_DENSITY: Final = 1000.0
@@ -87,27 +99,9 @@ DESIGN_COLUMNS: Final = (
     "filter_warnings",
 )
 
-Values = float | FloatArray
-"""One value, or as many as are wanted at once."""
-
 _MILLIMETRE: Final = LENGTH_UNITS["mm"]
 _ERGUN_VISCOUS: Final = 150.0
 _ERGUN_INERTIAL: Final = 1.75
-
-
-class _Rule(NamedTuple):
-    """Range of a quantity; comparisons with nan are false, so that no rule accepts it."""
-
-    accepts: Callable[[FloatArray], np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]
-    text: str
-
-
-_POSITIVE = _Rule(lambda x: (x > 0.0) & (x < math.inf), "must be positive and finite")
-_NOT_NEGATIVE = _Rule(lambda x: (x >= 0.0) & (x < math.inf), "must be zero or positive, and finite")
-_FRACTION = _Rule(lambda x: (x > 0.0) & (x < 1.0), "must be above 0 and below 1")
-_WHOLE_OR_LESS = _Rule(lambda x: (x > 0.0) & (x <= 1.0), "must be above 0 and at most 1")
-_SHARE = _Rule(lambda x: (x >= 0.0) & (x < 1.0), "must be at least 0 and below 1")
-_TURNING = _Rule(_POSITIVE.accepts, "must be positive and finite (a drum at rest would need an infinite area)")
 
 
 @dataclass(frozen=True)
@@ -151,14 +145,14 @@ class DrumFilter:
     filtrate_per_slurry: Values = 1.0
 
     def __post_init__(self) -> None:
-        _refuse(
-            _problem("pressure_drop", self.pressure_drop, "Pa", _POSITIVE),
-            _problem("submerged_fraction", self.submerged_fraction, "", _FRACTION),
-            _problem("rotation_rate", self.rotation_rate, "1/s", _TURNING),
-            _problem("medium_resistance", self.medium_resistance, "1/m", _NOT_NEGATIVE),
-            _problem("viscosity", self.viscosity, "Pa s", _POSITIVE),
-            _problem("slurry_concentration", self.slurry_concentration, "kg/m3", _POSITIVE),
-            _problem("filtrate_per_slurry", self.filtrate_per_slurry, "", _WHOLE_OR_LESS),
+        refuse(
+            problem("pressure_drop", self.pressure_drop, "Pa", POSITIVE),
+            problem("submerged_fraction", self.submerged_fraction, "", FRACTION),
+            problem("rotation_rate", self.rotation_rate, "1/s", TURNING),
+            problem("medium_resistance", self.medium_resistance, "1/m", NOT_NEGATIVE),
+            problem("viscosity", self.viscosity, "Pa s", POSITIVE),
+            problem("slurry_concentration", self.slurry_concentration, "kg/m3", POSITIVE),
+            problem("filtrate_per_slurry", self.filtrate_per_slurry, "", WHOLE_OR_LESS),
         )
 
 
@@ -192,12 +186,12 @@ class Cake:
     largest: float
 
     def __post_init__(self) -> None:
-        _refuse(
-            None if math.isnan(self.resistance) else _problem("resistance", self.resistance, "m/kg", _NOT_NEGATIVE),
-            None if math.isnan(self.porosity) else _problem("porosity", self.porosity, "", _FRACTION),
-            _problem("density", self.density, "kg/m3", _POSITIVE),
-            _problem("sauter_mean", self.sauter_mean, "m", _POSITIVE),
-            _problem("largest", self.largest, "m", _POSITIVE),
+        refuse(
+            None if math.isnan(self.resistance) else problem("resistance", self.resistance, "m/kg", NOT_NEGATIVE),
+            None if math.isnan(self.porosity) else problem("porosity", self.porosity, "", FRACTION),
+            problem("density", self.density, "kg/m3", POSITIVE),
+            problem("sauter_mean", self.sauter_mean, "m", POSITIVE),
+            problem("largest", self.largest, "m", POSITIVE),
         )
 
     @property
@@ -244,9 +238,9 @@ def belt(drum: DrumFilter, form_share: Values, belt_speed: Values, belt_length: 
     FilterError
         If an argument is out of range.
     """
-    share = _require("form_share", form_share, "", _FRACTION)
-    speed = _require("belt_speed", belt_speed, "m/s", _POSITIVE)
-    length = _require("belt_length", belt_length, "m", _POSITIVE)
+    share = require("form_share", form_share, "", FRACTION)
+    speed = require("belt_speed", belt_speed, "m/s", POSITIVE)
+    length = require("belt_length", belt_length, "m", POSITIVE)
     return replace(drum, submerged_fraction=share, rotation_rate=speed / length)
 
 
@@ -260,8 +254,8 @@ def forming_time(drum: DrumFilter, resistance: ArrayLike, cake_mass: ArrayLike) 
     FilterError
         If an argument is out of range.
     """
-    alpha = _require("resistance", resistance, "m/kg", _NOT_NEGATIVE)
-    mass = _require("cake_mass", cake_mass, "kg/m2", _POSITIVE)
+    alpha = require("resistance", resistance, "m/kg", NOT_NEGATIVE)
+    mass = require("cake_mass", cake_mass, "kg/m2", POSITIVE)
     resisting = drum.filtrate_per_slurry * drum.viscosity * (0.5 * alpha * mass + drum.medium_resistance)
     return np.asarray(resisting * mass / (drum.slurry_concentration * drum.pressure_drop))
 
@@ -289,12 +283,12 @@ def area(drum: DrumFilter, resistance: ArrayLike, slurry_flow: ArrayLike) -> Flo
     smaller by at most ``c / (rho (1 - eps))`` would do. A drum of :func:`on_filtrate_basis` has that area.
     """
     # ASSUME: on the slurry basis, filtrate volume = slurry volume; model_warnings says where that misleads
-    return np.asarray(_require("slurry_flow", slurry_flow, "m3/s", _POSITIVE) * _area_per_flow(drum, resistance))
+    return np.asarray(require("slurry_flow", slurry_flow, "m3/s", POSITIVE) * _area_per_flow(drum, resistance))
 
 
 def capacity(drum: DrumFilter, resistance: ArrayLike, filter_area: ArrayLike) -> FloatArray:
     """Slurry flow that a filter area (m2) can take, m3/s: the inverse of :func:`area`."""
-    return np.asarray(_require("filter_area", filter_area, "m2", _POSITIVE) / _area_per_flow(drum, resistance))
+    return np.asarray(require("filter_area", filter_area, "m2", POSITIVE) / _area_per_flow(drum, resistance))
 
 
 def cake_mass_per_area(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
@@ -340,7 +334,7 @@ def resistance_for_cake_share(drum: DrumFilter, share: ArrayLike) -> FloatArray:
     """
     if np.any(np.equal(drum.medium_resistance, 0.0)):
         raise FilterError("medium_resistance = 0 1/m: must be positive, or the cake holds all of the resistance")
-    s = _require("share", share, "", _SHARE)
+    s = require("share", share, "", SHARE)
     resisting = 2.0 * drum.filtrate_per_slurry * drum.viscosity * drum.rotation_rate * drum.medium_resistance**2
     driving = drum.pressure_drop * drum.submerged_fraction * drum.slurry_concentration
     return np.asarray(resisting / driving * s / (1.0 - s) ** 2)
@@ -363,9 +357,9 @@ def particle_reynolds(
     The resistance (m/kg) sets the velocity u of :func:`filtrate_velocity`; porosity in (0, 1), Sauter mean diameter d32
     (six over the crystals' specific surface) in m, density rho_l of the filtrate in kg/m3.
     """
-    size = _require("sauter_mean", sauter_mean, "m", _POSITIVE)
-    solids = 1.0 - _require("porosity", porosity, "", _FRACTION)
-    momentum = _require("liquid_density", liquid_density, "kg/m3", _POSITIVE) * filtrate_velocity(drum, resistance)
+    size = require("sauter_mean", sauter_mean, "m", POSITIVE)
+    solids = 1.0 - require("porosity", porosity, "", FRACTION)
+    momentum = require("liquid_density", liquid_density, "kg/m3", POSITIVE) * filtrate_velocity(drum, resistance)
     return np.asarray(momentum * size / (drum.viscosity * solids))
 
 
@@ -417,7 +411,7 @@ def design_table(
     FilterError
         As :func:`area` and :func:`cake_thickness`; or if the flows are neither one nor n.
     """
-    flows = _require("slurry_flow", slurry_flow, "m3/s", _POSITIVE)
+    flows = require("slurry_flow", slurry_flow, "m3/s", POSITIVE)
     if flows.shape not in ((), (len(cakes),)):
         raise FilterError(f"slurry_flow has shape {flows.shape}: must be one number or one per cake ({len(cakes)})")
     each = np.broadcast_to(flows, len(cakes))
@@ -495,7 +489,7 @@ def _forming_warning(drum: DrumFilter, cake: Cake) -> str | None:
 
 def _area_per_flow(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
     """Area per slurry flow, s/m: the stable form of eq. 10 in the module's docstring."""
-    alpha = _require("resistance", resistance, "m/kg", _NOT_NEGATIVE)
+    alpha = require("resistance", resistance, "m/kg", NOT_NEGATIVE)
     if np.any(np.equal(drum.medium_resistance, 0.0) & (alpha == 0.0)):
         raise FilterError("resistance = 0 m/kg: must be positive where medium_resistance = 0 1/m (nothing resists)")
     driving = 2.0 * drum.pressure_drop * drum.submerged_fraction
@@ -507,29 +501,11 @@ def _area_per_flow(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
 
 def _cake_density(drum: DrumFilter, porosity: ArrayLike, density: ArrayLike) -> FloatArray:
     """Crystals per volume of cake, kg/m3; refused where the slurry has no liquid to spare."""
-    solids = 1.0 - _require("porosity", porosity, "", _FRACTION)
-    dense = np.asarray(_require("density", density, "kg/m3", _POSITIVE) * solids)
+    solids = 1.0 - require("porosity", porosity, "", FRACTION)
+    dense = np.asarray(require("density", density, "kg/m3", POSITIVE) * solids)
     if (dense <= drum.slurry_concentration).any():
         raise FilterError(
-            f"slurry_concentration = {np.max(drum.slurry_concentration):g} kg/m3: must be below the {dense.min():g} kg/m3 of "
-            "crystals in the cake, or there is no liquid to filter off"
+            f"slurry_concentration = {np.max(drum.slurry_concentration):g} kg/m3: must be below the {dense.min():g} "
+            "kg/m3 of crystals in the cake, or there is no liquid to filter off"
         )
     return dense
-
-
-def _require(name: str, value: ArrayLike, unit: str, rule: _Rule) -> FloatArray:
-    _refuse(_problem(name, value, unit, rule))
-    return np.asarray(value, dtype=np.float64)
-
-
-def _problem(name: str, value: ArrayLike, unit: str, rule: _Rule) -> str | None:
-    """Message about the first value that a rule does not accept, None where it accepts all."""
-    values = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    bad = values[~rule.accepts(values)]
-    return f"{f'{name} = {bad[0]:g} {unit}'.rstrip()}: {rule.text}" if bad.size else None
-
-
-def _refuse(*problems: str | None) -> None:
-    found = [problem for problem in problems if problem is not None]
-    if found:
-        raise FilterError("\n".join(found))
