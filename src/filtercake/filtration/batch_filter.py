@@ -195,9 +195,22 @@ def cycle(batch: BatchFilter, cake: BatchCake, height: ArrayLike) -> Cycle:
     quadratic, linear = _washing(batch, cake)
     washing = quadratic * mass**2 + linear * mass
     standing = np.asarray(batch.standing_time)
-    total = filtering + washing + standing
-    numbers = np.broadcast_arrays(mass, thick, filtering, washing, standing, total, mass / total)
-    return Cycle(*numbers, np.broadcast_to(thick <= batch.height_limit, numbers[0].shape))
+    total = np.asarray(filtering + washing + standing)
+    shape = np.broadcast_shapes(mass.shape, total.shape)
+
+    def filled(values: FloatArray) -> FloatArray:
+        return np.broadcast_to(values, shape)
+
+    return Cycle(
+        cake_mass=filled(mass),
+        height=filled(thick),
+        filtration_time=filled(filtering),
+        wash_time=filled(washing),
+        standing_time=filled(standing),
+        time=filled(total),
+        productivity=filled(mass / total),
+        fits=np.broadcast_to(thick <= batch.height_limit, shape),
+    )
 
 
 def best_height(batch: BatchFilter, cake: BatchCake) -> FloatArray:

@@ -27,6 +27,7 @@ POSITIVE = Rule(lambda x: (x > 0.0) & (x < math.inf), "must be positive and fini
 NOT_NEGATIVE = Rule(lambda x: (x >= 0.0) & (x < math.inf), "must be zero or positive, and finite")
 FRACTION = Rule(lambda x: (x > 0.0) & (x < 1.0), "must be above 0 and below 1")
 WHOLE_OR_LESS = Rule(lambda x: (x > 0.0) & (x <= 1.0), "must be above 0 and at most 1")
+SATURATION = Rule(lambda x: (x >= 0.0) & (x <= 1.0), "must be from 0 to 1")
 SHARE = Rule(lambda x: (x >= 0.0) & (x < 1.0), "must be at least 0 and below 1")
 TURNING = Rule(POSITIVE.accepts, "must be positive and finite (a drum at rest would need an infinite area)")
 
