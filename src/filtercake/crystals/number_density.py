@@ -124,6 +124,8 @@ def _check_grid(sizes: FloatArray, density: FloatArray) -> None:
         raise CsdError(f"{sizes.size} sizes: a number density needs at least 2")
     if not (np.isfinite(sizes).all() and sizes[0] >= 0.0 and (np.diff(sizes) > 0.0).all()):
         raise CsdError("size: must be finite, ascend, and start at 0 or above, in m")
-    bad = density[~(density >= -ROUNDING * np.max(np.abs(density), initial=0.0)) | ~np.isfinite(density)]
+    bad = density[~np.isfinite(density)]
+    if not bad.size:
+        bad = density[density < -ROUNDING * np.abs(density).max()]
     if bad.size:
         raise CsdError(f"number_density = {bad[0]:g}: must be finite and not negative")
