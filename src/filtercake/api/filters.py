@@ -83,6 +83,10 @@ class BatchFilterOptions(Model):
     def _one_way(self) -> BatchFilterOptions:
         if (self.slurry_flow_m3_h is None) == (self.filter_area_m2 is None):
             raise ValueError("needs exactly one of slurry_flow_m3_h and filter_area_m2")
+        if self.turnaround_time_min + self.deliquoring_time_min == 0.0:
+            raise ValueError(
+                "turnaround_time_min or deliquoring_time_min must be above 0, or ever thinner cakes are better"
+            )
         return self
 
 

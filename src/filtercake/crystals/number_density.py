@@ -6,6 +6,7 @@ length of a range of sizes are the integrals of L^3 n, L^2 n and L n over it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
@@ -108,13 +109,17 @@ def cut_moments(
 def _end(share_below: Callable[[float], float], start: float) -> float:
     """Size with the volume above it that an MSMPR product has above its largest class."""
     target = float(scipy.special.gammainc(4.0, UPPER_SCALES))
-    high = start
-    while share_below(high) < target:
-        high *= 2.0
-    low = high
-    while share_below(low) > target:
-        low *= 0.5
-    return float(scipy.optimize.brentq(lambda size: share_below(size) - target, low, high, xtol=1e-12 * high))
+
+    def beyond(log_size: float) -> float:
+        return share_below(start * math.exp(log_size)) - target
+
+    for reach in (4.0, 16.0, 64.0):
+        if beyond(-reach) < 0.0 < beyond(reach):
+            return start * math.exp(float(scipy.optimize.brentq(beyond, -reach, reach, xtol=1e-12)))
+    raise CrystallizerError(
+        f"the product has no end near a size of {start / MICROMETRE:.4g} um; check the residence time, the kinetics "
+        "and the sizes of fines and coarse crystals"
+    )
 
 
 def _check_grid(sizes: FloatArray, density: FloatArray) -> None:

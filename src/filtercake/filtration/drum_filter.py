@@ -380,9 +380,30 @@ def model_warnings(drum: DrumFilter, cake: Cake, liquid_density: float = WATER_D
         _layers_warning(drum, cake),
         _reynolds_warning(drum, cake, liquid_density),
         _slurry_warning(drum, cake),
-        _forming_warning(drum, cake),
+        forming_warning(drum, cake.resistance, cake.porosity, cake.density),
     )
     return [text for text in found if text is not None]
+
+
+def forming_warning(drum: DrumFilter, resistance: float, porosity: float, density: float) -> str | None:
+    """Warn of a slurry too slow for any continuous filter, drum or belt; None where it is not.
+
+    Specific cake resistance in m/kg, crystal density in kg/m3.
+
+    Raises
+    ------
+    FilterError
+        If an argument is out of range.
+    """
+    solids = 1.0 - require("porosity", porosity, "", FRACTION)
+    mass = FORMING_THICKNESS * solids * require("density", density, "kg/m3", POSITIVE)
+    seconds = float(forming_time(drum, resistance, mass))
+    if seconds <= LONGEST_FORMING:
+        return None
+    return (
+        f"{FORMING_THICKNESS / _MILLIMETRE:g} mm of cake take {duration(seconds)} to form: over "
+        f"{duration(LONGEST_FORMING)} no continuous filter should be tried; take a batch filter"
+    )
 
 
 def design_table(
@@ -473,17 +494,6 @@ def _slurry_warning(drum: DrumFilter, cake: Cake) -> str | None:
     return (
         f"{share:.3g} of the slurry's volume stays in the cake (slurry of {drum.slurry_concentration:.4g} kg/m3): over "
         f"{MAXIMUM_CAKE_VOLUME:g} the area is clearly too large, since eq. 10 counts all slurry as filtrate"
-    )
-
-
-def _forming_warning(drum: DrumFilter, cake: Cake) -> str | None:
-    mass = FORMING_THICKNESS * cake.density * (1.0 - cake.porosity)
-    seconds = float(forming_time(drum, cake.resistance, mass))
-    if seconds <= LONGEST_FORMING:
-        return None
-    return (
-        f"{FORMING_THICKNESS / _MILLIMETRE:g} mm of cake take {duration(seconds)} to form: over "
-        f"{duration(LONGEST_FORMING)} no continuous filter should be tried; take a batch filter"
     )
 
 
