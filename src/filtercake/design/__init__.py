@@ -1,4 +1,4 @@
-"""What a crystallizer and a filter cost, for choosing between them.
+"""What crystallizers and filters cost, for choosing between designs.
 
-Imports from the study's types of values, and all below; never from packings that are running or from figures.
+Imports from the study (its types of values and its checks) and all below.
 """
