@@ -82,6 +82,8 @@ class CrystallizerProduct:
         G, m/s, and B0, #/(m3 s), of each stage.
     product_concentration_kg_m3 : float
         Crystals per volume of mixed product flow, kg/m3.
+    warnings : tuple of str
+        Residence times that the kinetics are not meant for.
     """
 
     csd: CrystalSizeDistribution
@@ -89,6 +91,7 @@ class CrystallizerProduct:
     growth_rate_m_s: tuple[float, ...]
     nucleation_rate_m3_s: tuple[float, ...]
     product_concentration_kg_m3: float
+    warnings: tuple[str, ...]
 
 
 def crystallizer(**options: Any) -> CrystallizerProduct:
@@ -119,6 +122,7 @@ def crystallizer(**options: Any) -> CrystallizerProduct:
         growth_rate_m_s=tuple(stage.growth_rate for stage in stages),
         nucleation_rate_m3_s=tuple(stage.nucleation_rate for stage in stages),
         product_concentration_kg_m3=stages[-1].slurry_concentration,
+        warnings=_doubts(kinetics, times),
     )
 
 
@@ -137,4 +141,16 @@ def _single(given: CrystallizerOptions, kinetics: Kinetics, residence_time: floa
         growth_rate_m_s=(state.growth_rate,),
         nucleation_rate_m3_s=(state.nucleation_rate,),
         product_concentration_kg_m3=state.product_concentration,
+        warnings=_doubts(kinetics, [residence_time]),
+    )
+
+
+def _doubts(kinetics: Kinetics, residence_times: Sequence[float]) -> tuple[str, ...]:
+    outside = dict.fromkeys(f"{time / MINUTE:g}" for time in residence_times if not kinetics.covers(time))
+    if not outside or kinetics.residence_time_range is None:
+        return ()
+    shortest, longest = (time / MINUTE for time in kinetics.residence_time_range)
+    return (
+        f"residence_time_min = {', '.join(outside)}: the kinetics {kinetics.name} are meant for {shortest:g} to "
+        f"{longest:g} min",
     )

@@ -581,9 +581,12 @@ def _run_crystallizer(options: argparse.Namespace) -> int:
         "density_kg_m3": found.density_kg_m3,
         "growth_rate_m_s": found.growth_rate_m_s,
         "nucleation_rate_m3_s": found.nucleation_rate_m3_s,
+        "warnings": found.warnings,
     }
     if options.json:
         return _print_json(values)
+    for warning in found.warnings:
+        _say(f"warning: {words.with_flags(warning, vars(options))}")
     stages: list[Line] = []
     rates = zip(found.growth_rate_m_s, found.nucleation_rate_m3_s, strict=True)
     for number, (growth, nucleation) in enumerate(rates, 1):

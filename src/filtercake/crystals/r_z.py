@@ -107,6 +107,7 @@ class RzState:
         MT in the crystallizer, kg/m3.
     product_concentration : float
         Crystals in the product, kg per m3 of mixed product flow; above MT where coarse crystals are removed faster.
+        A slurry cannot hold as much as a cake does: a z that asks for it is out of reach.
     withdrawal : Withdrawal
         How crystals leave it.
     kinetics : str

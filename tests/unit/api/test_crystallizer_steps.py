@@ -20,6 +20,7 @@ def test_alone_it_is_the_distribution_of_the_kinetics() -> None:
     assert found.csd.sum_x_over_d2 == pytest.approx(plain.full.sum_x_over_d2, rel=1e-12)
     assert found.growth_rate_m_s == (pytest.approx(6.4907e-8, rel=1e-4),)
     assert found.density_kg_m3 == plain.density_kg_m3 == 2450.0
+    assert found.warnings == ()
 
 
 def test_fines_dissolution_and_classified_removal() -> None:
@@ -39,6 +40,7 @@ def test_a_cascade_from_a_list_or_text(given: str) -> None:
     assert len(found.growth_rate_m_s) == len(found.nucleation_rate_m3_s) == 3
     assert found.csd.sauter_mean == pytest.approx(150.2e-6, rel=1e-3)
     assert found.product_concentration_kg_m3 == 200.0
+    assert found.warnings == ("residence_time_min = 5: the kinetics ammonium_alum are meant for 15 to 60 min",)
 
 
 def test_kinetics_of_ones_own(tmp_path: Path) -> None:

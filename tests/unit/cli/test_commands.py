@@ -254,7 +254,11 @@ def test_a_crystallizers_product_goes_on_as_a_file(capsys: Capture, tmp_path: Pa
     assert found["sauter_mean_um"] > as_json(["crystallizer", *ALUM], capsys)["sauter_mean_um"]
     stages = ["--residence-time-min", "5,10", "--slurry-concentration-kg-m3", "100,200"]
     assert main(["crystallizer", "--kinetics", "ammonium_alum", *stages]) == 0
-    assert "growth rate, stage 2" in capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert "growth rate, stage 2" in printed.out
+    assert printed.err == (
+        "warning: --residence-time-min = 5, 10: the kinetics ammonium_alum are meant for 15 to 60 min\n"
+    )
 
 
 def test_costs_stand_side_by_side(capsys: Capture) -> None:
