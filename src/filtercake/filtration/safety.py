@@ -49,7 +49,7 @@ class DesignResistance:
         if factor > PAPER_FACTOR:
             return f"{own}, beyond the paper's factor of {PAPER_FACTOR:g}: design for the interval's end"
         return (
-            f"{own}; the paper's factor is {PAPER_FACTOR:g}, which also covers what no interval knows of: other "
+            f"{own}; the paper's factor is {PAPER_FACTOR:g}, which leaves room for what no interval knows of: other "
             "crystals, another shape, compression"
         )
 

@@ -68,7 +68,7 @@ def test_crystals_are_the_sum_of_those_born_and_grown(run: list[tuple[float, flo
     assert stages[-1].moments == pytest.approx((m0, m1, m2, m3), rel=1e-9)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(runs.filter(lambda run: len(run) < 4))
 def test_the_products_sums_are_those_of_its_moments(run: list[tuple[float, float]]) -> None:
     last = solve(run)[-1].moments

@@ -40,8 +40,8 @@ def test_the_end_is_between_the_largest_and_the_sum(alpha: float, one: float, ot
 
 def test_words_say_which_asks_for_more() -> None:
     assert design_resistance(1e10, 2e9).words() == (
-        "the 95 % interval ends at 1.2 times the resistance found; the paper's factor is 2, which also covers what no "
-        "interval knows of: other crystals, another shape, compression"
+        "the 95 % interval ends at 1.2 times the resistance found; the paper's factor is 2, which leaves room for what "
+        "no interval knows of: other crystals, another shape, compression"
     )
     assert design_resistance(1e10, 1.5e10).words() == (
         "the 95 % interval ends at 2.5 times the resistance found, beyond the paper's factor of 2: design for the "
