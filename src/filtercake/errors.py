@@ -156,6 +156,10 @@ class FilterError(FiltercakeError):
     """A drum filter, or a cake on it, has a value that makes no sense."""
 
 
+class CostError(FiltercakeError):
+    """Equipment has no cost by a correlation: no such correlation, or a size that it cannot say anything about."""
+
+
 class CalibrationError(FiltercakeError):
     """A calibration has too little to go on."""
 

@@ -170,6 +170,13 @@ COMMANDS = (
     "resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5 --sphericity 0.9 --json",
     "filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 --pressure-drop-kPa 53.3 "
     "--submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9 --porosity 0.3 --density-kg-m3 2450",
+    "filter-batch --resistance-m-kg 1e10 --porosity 0.4 --density-kg-m3 1500 --slurry-flow-m3-h 1 --wash-ratio 2 "
+    "--slurry-concentration-kg-m3 100 --pressure-drop-kPa 200 --medium-resistance-1-m 1e10 --turnaround-time-min 20",
+    "deliquor --resistance-m-kg 1e9 --porosity 0.4 --density-kg-m3 1300 --sauter-mean-um 50 --cake-height-mm 20 "
+    "--pressure-drop-kPa 50 --moisture 0.15",
+    "crystallizer --kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200 --fines-ratio 5 "
+    "--fines-size-um 50 --output out/product.csv",
+    "cost --equipment drum_filter --filter-area-m2 3.44 --cost-index 800",
     "porosity config/test/tiny.npz --profile",
     "export pmma pmma_50_50 --results out --output out/export",
     "rerun out/nothing",

@@ -45,6 +45,7 @@ from filtercake.calibration.measurements import load_measurements
 from filtercake.cli.commands import EXAMPLES as HELP_EXAMPLES
 from filtercake.cli.commands import build_parser, main
 from filtercake.crystals.crystallizer import load_kinetics
+from filtercake.design.costs import load_correlations
 from filtercake.errors import ConfigError
 from filtercake.study import engine_choice
 from filtercake.study.loading import load_study, load_workflow
@@ -288,6 +289,7 @@ def load(path: Path, root: Path) -> None:
         "config/measurements": load_measurements,
         "config/calibrations": lambda file: load_calibration(file, studies),
         "config": load_kinetics,
+        "config/costs": load_correlations,
     }
     loaders[str(path.parent.relative_to(root))](path)
 

@@ -17,7 +17,7 @@ FLOORS = (
     ("permeability",),
     ("study",),
     ("results",),
-    ("calibration", "run"),
+    ("calibration", "design", "run"),
     ("figures",),
     ("api", "report"),
     ("cli", "validation"),

@@ -15,6 +15,7 @@ from filtercake.crystals.cells import LARGEST_FILE
 from filtercake.crystals.crystallizer import load_kinetics
 from filtercake.crystals.csd import read_csd
 from filtercake.crystals.instruments import MOST_CLASSES
+from filtercake.design.costs import load_correlations
 from filtercake.errors import (
     MOST_SHOWN,
     ConfigError,
@@ -33,6 +34,7 @@ from filtercake.user_files import read_yaml
 READERS: dict[str, Callable[[Path], Any]] = {
     "yaml": read_yaml,
     "kinetics": load_kinetics,
+    "costs": load_correlations,
     "measurements": load_measurements,
     "csd": read_csd,
     "test": read_test,

@@ -2,11 +2,21 @@
 
 ``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`porosity`, :func:`profile`,
 :func:`permeability`, :func:`permeabilities`, :func:`resistance`, :func:`filter_area`, :func:`filtration_test`,
-:func:`filtration_tests`, :func:`export` and :func:`rerun`. It may import from every room but ``cli``, ``report``
-and ``validation``.
+:func:`filtration_tests`, :func:`crystallizer`, :func:`batch_filter`, :func:`deliquoring`, :func:`cost`, :func:`export`
+and :func:`rerun`. It may import from every room but ``cli``, ``report`` and ``validation``.
 """
 
+from filtercake.api.crystallizer import CrystallizerOptions, CrystallizerProduct, crystallizer
+from filtercake.api.design import CostOptions, EquipmentCost, cost
 from filtercake.api.export import Exported, export, first_porosity, rerun
+from filtercake.api.filters import (
+    BatchFilterOptions,
+    BatchFilterSize,
+    Deliquored,
+    DeliquoringOptions,
+    batch_filter,
+    deliquoring,
+)
 from filtercake.api.filtration import FiltrationResult, filtration_test, filtration_tests
 from filtercake.api.pack import Bed, pack
 from filtercake.api.permeability import (
@@ -32,8 +42,16 @@ from filtercake.api.steps import (
 )
 
 __all__ = [
+    "BatchFilterOptions",
+    "BatchFilterSize",
     "Bed",
+    "CostOptions",
+    "CrystallizerOptions",
+    "CrystallizerProduct",
+    "Deliquored",
+    "DeliquoringOptions",
     "Distribution",
+    "EquipmentCost",
     "Exported",
     "FilterOptions",
     "FilterSize",
@@ -44,6 +62,10 @@ __all__ = [
     "PermeabilityOptions",
     "Resistance",
     "ResistanceOptions",
+    "batch_filter",
+    "cost",
+    "crystallizer",
+    "deliquoring",
     "distribution",
     "export",
     "filter_area",

@@ -58,6 +58,19 @@ EXAMPLES = {
         "filtercake filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 "
         "--pressure-drop-kPa 53.3 --submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9"
     ),
+    "filter-batch": (
+        "filtercake filter-batch --resistance-m-kg 1e10 --porosity 0.4 --density-kg-m3 1500 --slurry-flow-m3-h 1 "
+        "--slurry-concentration-kg-m3 100 --pressure-drop-kPa 200 --medium-resistance-1-m 1e10 --turnaround-time-min 20"
+    ),
+    "deliquor": (
+        "filtercake deliquor --resistance-m-kg 1e9 --porosity 0.4 --density-kg-m3 1300 --sauter-mean-um 50 "
+        "--cake-height-mm 20 --pressure-drop-kPa 50 --moisture 0.15"
+    ),
+    "crystallizer": (
+        "filtercake crystallizer --kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200 "
+        "--fines-ratio 5 --fines-size-um 50 --output product.csv"
+    ),
+    "cost": "filtercake cost --equipment drum_filter --filter-area-m2 3.44 --cost-index 800",
 }
 """One call of each command, shown by its --help."""
 
@@ -112,6 +125,10 @@ def build_parser() -> words.Parser:
     _add_permeability(commands)
     _add_resistance(commands)
     _add_filter_area(commands)
+    _add_filter_batch(commands)
+    _add_deliquor(commands)
+    _add_crystallizer(commands)
+    _add_cost(commands)
     _add_test(commands)
     _add_export(commands)
     _add_rerun(commands)
@@ -209,6 +226,37 @@ def _add_filter_area(commands: Any) -> None:
     words.add_model(parser.add_argument_group("filter and slurry"), api.FilterOptions)
 
 
+def _add_filter_batch(commands: Any) -> None:
+    text = (
+        "Area of a batch filter (Nutsche, leaf, press; m2) for a slurry flow (m3/h), or the flow that an area takes; "
+        "its cycle, and the cake height of most cake per time."
+    )
+    parser = _command(commands, "filter-batch", _run_filter_batch, text)
+    words.add_model(parser.add_argument_group("filter, cake and slurry"), api.BatchFilterOptions)
+
+
+def _add_deliquor(commands: Any) -> None:
+    text = "Moisture of a cake after some time (min) of deliquoring by gas, or the time that a moisture takes."
+    parser = _command(commands, "deliquor", _run_deliquor, text)
+    words.add_model(parser.add_argument_group("cake, liquor and gas"), api.DeliquoringOptions)
+
+
+def _add_crystallizer(commands: Any) -> None:
+    text = (
+        "Product of a continuous crystallizer: mixed, with fines dissolution and classified removal (sizes in um), or "
+        "a cascade (values of its stages with commas between)."
+    )
+    parser = _command(commands, "crystallizer", _run_crystallizer, text)
+    words.add_model(parser.add_argument_group("crystallizer"), api.CrystallizerOptions)
+    parser.add_argument("--output", metavar="CSV", help="write the product's classes to this file")
+
+
+def _add_cost(commands: Any) -> None:
+    text = "What a filter (size in m2) or crystallizer (m3, or kg/s) costs, by every correlation that there is of it."
+    parser = _command(commands, "cost", _run_cost, text)
+    words.add_model(parser.add_argument_group("equipment"), api.CostOptions)
+
+
 def _add_test(commands: Any) -> None:
     text = (
         "Specific cake resistance (m/kg) and medium resistance (1/m) of a filtration test at constant pressure, with "
@@ -260,11 +308,7 @@ def _run_csd(options: argparse.Namespace) -> int:
     found = api.distribution(**words.source(options))
     table = to_table(found.full, found.truncated)
     if options.output is not None:
-        target = Path(options.output)
-        if not target.name:
-            raise words.UsageError(f"--output = {options.output!r}: must be the name of a file")
-        with publish(target) as temporary:
-            table.to_csv(temporary, index=False)
+        _write_csv(table, options.output)
     full, packed = found.full, found.truncated
     values = {
         "sum_x_over_d_1_m": full.sum_x_over_d,
@@ -295,6 +339,14 @@ def _run_csd(options: argparse.Namespace) -> int:
             ("packed: sum of x/d2", values["packed_sum_x_over_d2_1_m2"], "1/m2"),
         ]
     )
+
+
+def _write_csv(table: pd.DataFrame, output: str) -> None:
+    target = Path(output)
+    if not target.name:
+        raise words.UsageError(f"--output = {output!r}: must be the name of a file")
+    with publish(target) as temporary:
+        table.to_csv(temporary, index=False)
 
 
 def _say_understood(options: argparse.Namespace, source: api.Distribution) -> None:
@@ -468,6 +520,111 @@ def _run_filter_area(options: argparse.Namespace) -> int:
     ]
     if found.cake_thickness_mm is not None:
         lines.append(("cake thickness", found.cake_thickness_mm, "mm"))
+    if found.safety:
+        lines.append(("area, end of the interval", found.filter_area_upper_m2, "m2"))
+        lines.append(("area, paper's factor 2", found.filter_area_paper_factor_m2, "m2"))
+        _say(found.safety)
+    for warning in found.warnings:
+        _say(f"warning: {warning}")
+    return _print_lines(lines)
+
+
+def _run_filter_batch(options: argparse.Namespace) -> int:
+    found = api.batch_filter(**words.given(options, api.BatchFilterOptions.model_fields))
+    if options.json:
+        return _print_json(asdict(found))
+    if not found.fits:
+        _say(f"warning: the cake is higher than {words.flag('height_limit_mm')}")
+    return _print_lines(
+        [
+            ("filter area", found.filter_area_m2, "m2"),
+            ("slurry flow, mean", found.slurry_flow_m3_h, "m3/h"),
+            ("slurry per batch", found.slurry_per_batch_m3, "m3"),
+            ("cake height", found.cake_height_mm, "mm"),
+            ("best cake height", found.best_height_mm, "mm"),
+            ("cake per area", found.cake_mass_kg_m2, "kg/m2"),
+            ("filtration", found.filtration_time_min, "min"),
+            ("washing", found.wash_time_min, "min"),
+            ("deliquoring", found.deliquoring_time_min, "min"),
+            ("turnaround", found.turnaround_time_min, "min"),
+            ("cycle", found.cycle_time_min, "min"),
+            ("crystals", found.crystals_kg_m2_h, "kg/(m2 h)"),
+        ]
+    )
+
+
+def _run_deliquor(options: argparse.Namespace) -> int:
+    found = api.deliquoring(**words.given(options, api.DeliquoringOptions.model_fields))
+    if options.json:
+        return _print_json(asdict(found))
+    if not found.in_range:
+        _say("warning: the time is outside of the correlation's range")
+    within = f"({_number(found.moisture_low)} to {_number(found.moisture_high)} within the correlation's error)"
+    return _print_lines(
+        [
+            ("time of deliquoring", found.time_min, "min"),
+            ("moisture", found.moisture, within),
+            ("lowest moisture", found.lowest_moisture, ""),
+            ("saturation", found.saturation, ""),
+            ("irreducible saturation", found.irreducible_saturation, ""),
+            ("threshold pressure", found.threshold_pressure_kPa, "kPa"),
+        ]
+    )
+
+
+def _run_crystallizer(options: argparse.Namespace) -> int:
+    found = api.crystallizer(**words.given(options, api.CrystallizerOptions.model_fields))
+    csd = found.csd
+    if options.output is not None:
+        table = pd.DataFrame({"size_um": csd.size / MICROMETRE, "volume_fraction": csd.volume_fraction})
+        _write_csv(table, options.output)
+    values = {
+        "sum_x_over_d_1_m": csd.sum_x_over_d,
+        "sum_x_over_d2_1_m2": csd.sum_x_over_d2,
+        "sauter_mean_um": csd.sauter_mean / MICROMETRE,
+        "largest_um": csd.largest / MICROMETRE,
+        "classes": int(csd.size.size),
+        "product_concentration_kg_m3": found.product_concentration_kg_m3,
+        "density_kg_m3": found.density_kg_m3,
+        "growth_rate_m_s": found.growth_rate_m_s,
+        "nucleation_rate_m3_s": found.nucleation_rate_m3_s,
+        "warnings": found.warnings,
+    }
+    if options.json:
+        return _print_json(values)
+    for warning in found.warnings:
+        _say(f"warning: {words.with_flags(warning, vars(options))}")
+    stages: list[Line] = []
+    rates = zip(found.growth_rate_m_s, found.nucleation_rate_m3_s, strict=True)
+    for number, (growth, nucleation) in enumerate(rates, 1):
+        stage = f", stage {number}" if len(found.growth_rate_m_s) > 1 else ""
+        stages.append((f"growth rate{stage}", growth, "m/s"))
+        stages.append((f"nucleation rate{stage}", nucleation, "1/(m3 s)"))
+    return _print_lines(
+        [
+            *stages,
+            ("Sauter mean diameter", values["sauter_mean_um"], "um"),
+            ("sum of x/d", values["sum_x_over_d_1_m"], "1/m"),
+            ("sum of x/d2", values["sum_x_over_d2_1_m2"], "1/m2"),
+            ("crystals in the product", values["product_concentration_kg_m3"], "kg/m3"),
+        ]
+    )
+
+
+def _run_cost(options: argparse.Namespace) -> int:
+    found = api.cost(**words.given(options, api.CostOptions.model_fields))
+    if options.json:
+        return _print_json({"costs": [asdict(item) for item in found]})
+    currency = "thousand USD" if options.currency_per_usd is None else "thousand"
+    lines: list[Line] = []
+    for item in found:
+        lines.append((f"{item.title}: purchase", item.purchase / 1e3, currency))
+        lines.append((f"{item.title}: {item.installed_as}", item.installed / 1e3, currency))
+        if item.smallest is None:
+            _say(f"{item.correlation}: its source states no range ({item.source})")
+        elif not item.in_range:
+            limits = f"{_number(item.smallest)} to {_number(item.largest)} {item.size_unit}"
+            _say(f"warning: {item.correlation}: outside of its range, {limits} ({item.source})")
     return _print_lines(lines)
 
 

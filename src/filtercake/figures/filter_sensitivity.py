@@ -37,7 +37,7 @@ def draw(data: StudyData) -> Figure:
     drum = drum_of(data.study)
     own = drum.pressure_drop / KILOPASCAL
     pressures = sorted({*PRESSURES, float(f"{own:.12g}")})
-    media = sorted({*MEDIA, drum.medium_resistance})
+    media = sorted({*MEDIA, float(drum.medium_resistance)})
     table = filtered(data)
     figure, panels = style.panels(len(pressures) + 1, width=style.DOUBLE, height=6.0, columns=2)
     *areas, share = panels

@@ -11,21 +11,43 @@ The difference in the denominator cancels as alpha goes to 0. Multiplied by its 
 
 without cancellation, and exact at alpha = 0 (2 R: the medium alone) and at Rm = 0. It grows as 1/sqrt(n) when n goes
 to 0, so a drum at rest has no area and is refused.
+
+Slurry or filtrate
+------------------
+Eq. 10 counts the slurry's whole volume as filtrate, and so does the paper: its c is per volume of slurry. A share
+``1 - phi = c / (rho (1 - eps))`` of the slurry stays in the cake as crystals and liquor. Counting the filtrate that
+passes, phi V with c / phi kg of crystals per m3 of it, is the same formula with phi mu in place of mu. A drum has the
+slurry basis unless it is given ``filtrate_per_slurry``, for example by :func:`on_filtrate_basis`. For the paper's alum
+phi is 0.885, and the area 8 to 9 % larger on the slurry basis.
+
+A horizontal belt filter is the same apparatus unrolled: :func:`belt`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Final, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from filtercake.errors import FilterError
-from filtercake.units import LENGTH_UNITS, MICROMETRE, FloatArray
+from filtercake.filtration.ranges import (
+    FRACTION,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    TURNING,
+    WHOLE_OR_LESS,
+    Values,
+    problem,
+    refuse,
+    require,
+)
+from filtercake.units import LENGTH_UNITS, MICROMETRE, FloatArray, duration
 
 WATER_DENSITY: Final = 1000.0
 """Density the paper assumes for the filtrate, kg/m3."""
@@ -57,6 +79,13 @@ The usual limit of the Blake-Kozeny equation (Bird, Stewart & Lightfoot, Transpo
 inertia adds 1.2 % to the cake's resistance at 1 and 12 % at 10.
 """
 
+FORMING_THICKNESS: Final = 3e-3
+"""Cake, m, that a continuous filter must form within :data:`LONGEST_FORMING` (1/8 inch, rounded)."""
+
+LONGEST_FORMING: Final = 300.0
+"""Time, s, within which it must: slower slurries go to batch filters (Walas, Chemical Process Equipment, rules of
+thumb)."""
+
 MAXIMUM_CAKE_VOLUME: Final = 0.2
 """Share of the slurry's volume that may stay in the cake before eq. 10 misleads: it counts all of it as filtrate."""
 
@@ -73,20 +102,6 @@ DESIGN_COLUMNS: Final = (
 _MILLIMETRE: Final = LENGTH_UNITS["mm"]
 _ERGUN_VISCOUS: Final = 150.0
 _ERGUN_INERTIAL: Final = 1.75
-
-
-class _Rule(NamedTuple):
-    """Range of a quantity; comparisons with nan are false, so that no rule accepts it."""
-
-    accepts: Callable[[FloatArray], np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]
-    text: str
-
-
-_POSITIVE = _Rule(lambda x: (x > 0.0) & (x < math.inf), "must be positive and finite")
-_NOT_NEGATIVE = _Rule(lambda x: (x >= 0.0) & (x < math.inf), "must be zero or positive, and finite")
-_FRACTION = _Rule(lambda x: (x > 0.0) & (x < 1.0), "must be above 0 and below 1")
-_SHARE = _Rule(lambda x: (x >= 0.0) & (x < 1.0), "must be at least 0 and below 1")
-_TURNING = _Rule(_POSITIVE.accepts, "must be positive and finite (a drum at rest would need an infinite area)")
 
 
 @dataclass(frozen=True)
@@ -107,28 +122,37 @@ class DrumFilter:
         Viscosity mu of the filtrate, Pa s.
     slurry_concentration : float
         Slurry concentration c (the crystallizer's MT): kg of crystals per m3 of slurry.
+    filtrate_per_slurry : float
+        Volume phi of filtrate that a volume of slurry gives, in (0, 1]; 1 is the paper's slurry basis.
 
     Raises
     ------
     FilterError
         If a value is out of range; names every such value and what is allowed.
+
+    Notes
+    -----
+    Values may be arrays, too, that broadcast against each other and the arguments of the functions here, so that many
+    drums are sized at once; warnings and tables take one drum at a time.
     """
 
-    pressure_drop: float
-    submerged_fraction: float
-    rotation_rate: float
-    medium_resistance: float
-    viscosity: float
-    slurry_concentration: float
+    pressure_drop: Values
+    submerged_fraction: Values
+    rotation_rate: Values
+    medium_resistance: Values
+    viscosity: Values
+    slurry_concentration: Values
+    filtrate_per_slurry: Values = 1.0
 
     def __post_init__(self) -> None:
-        _refuse(
-            _problem("pressure_drop", self.pressure_drop, "Pa", _POSITIVE),
-            _problem("submerged_fraction", self.submerged_fraction, "", _FRACTION),
-            _problem("rotation_rate", self.rotation_rate, "1/s", _TURNING),
-            _problem("medium_resistance", self.medium_resistance, "1/m", _NOT_NEGATIVE),
-            _problem("viscosity", self.viscosity, "Pa s", _POSITIVE),
-            _problem("slurry_concentration", self.slurry_concentration, "kg/m3", _POSITIVE),
+        refuse(
+            problem("pressure_drop", self.pressure_drop, "Pa", POSITIVE),
+            problem("submerged_fraction", self.submerged_fraction, "", FRACTION),
+            problem("rotation_rate", self.rotation_rate, "1/s", TURNING),
+            problem("medium_resistance", self.medium_resistance, "1/m", NOT_NEGATIVE),
+            problem("viscosity", self.viscosity, "Pa s", POSITIVE),
+            problem("slurry_concentration", self.slurry_concentration, "kg/m3", POSITIVE),
+            problem("filtrate_per_slurry", self.filtrate_per_slurry, "", WHOLE_OR_LESS),
         )
 
 
@@ -162,18 +186,78 @@ class Cake:
     largest: float
 
     def __post_init__(self) -> None:
-        _refuse(
-            None if math.isnan(self.resistance) else _problem("resistance", self.resistance, "m/kg", _NOT_NEGATIVE),
-            None if math.isnan(self.porosity) else _problem("porosity", self.porosity, "", _FRACTION),
-            _problem("density", self.density, "kg/m3", _POSITIVE),
-            _problem("sauter_mean", self.sauter_mean, "m", _POSITIVE),
-            _problem("largest", self.largest, "m", _POSITIVE),
+        refuse(
+            None if math.isnan(self.resistance) else problem("resistance", self.resistance, "m/kg", NOT_NEGATIVE),
+            None if math.isnan(self.porosity) else problem("porosity", self.porosity, "", FRACTION),
+            problem("density", self.density, "kg/m3", POSITIVE),
+            problem("sauter_mean", self.sauter_mean, "m", POSITIVE),
+            problem("largest", self.largest, "m", POSITIVE),
         )
 
     @property
     def known(self) -> bool:
         """Whether porosity and resistance are known."""
         return not (math.isnan(self.resistance) or math.isnan(self.porosity))
+
+
+def on_filtrate_basis(drum: DrumFilter, porosity: ArrayLike, density: ArrayLike) -> DrumFilter:
+    """Return the drum that counts as filtrate what passes it, and not the slurry's whole volume.
+
+    Parameters
+    ----------
+    drum : DrumFilter
+        The drum, on whatever basis.
+    porosity, density : array_like
+        Porosity of the cake, in (0, 1), whose pores are full, and density of the crystals, kg/m3.
+
+    Raises
+    ------
+    FilterError
+        If an argument is out of range, or the slurry holds as many crystals as the cake.
+    """
+    share = drum.slurry_concentration / _cake_density(drum, porosity, density)
+    return replace(drum, filtrate_per_slurry=1.0 - share)
+
+
+def belt(drum: DrumFilter, form_share: Values, belt_speed: Values, belt_length: Values) -> DrumFilter:
+    """Return a horizontal belt filter: a drum that turns once while the belt passes its vacuum zones.
+
+    Parameters
+    ----------
+    drum : DrumFilter
+        Pressure drop, medium, filtrate and slurry; its submerged fraction and rotation rate are left aside.
+    form_share : float
+        Share of the belt's length on which the cake forms, in (0, 1); washing and deliquoring take the rest.
+    belt_speed : float
+        Speed of the belt, m/s.
+    belt_length : float
+        Length of the belt under vacuum, m. The area of :func:`area` is this length times the belt's width.
+
+    Raises
+    ------
+    FilterError
+        If an argument is out of range.
+    """
+    share = require("form_share", form_share, "", FRACTION)
+    speed = require("belt_speed", belt_speed, "m/s", POSITIVE)
+    length = require("belt_length", belt_length, "m", POSITIVE)
+    return replace(drum, submerged_fraction=share, rotation_rate=speed / length)
+
+
+def forming_time(drum: DrumFilter, resistance: ArrayLike, cake_mass: ArrayLike) -> FloatArray:
+    """Time that a cake of some mass per area (kg/m2) takes to form, s, whatever the drum's speed.
+
+    By Ruth's law, ``phi mu w (alpha w / 2 + Rm) / (c dP)``; ``f / n`` for the cake of :func:`cake_mass_per_area`.
+
+    Raises
+    ------
+    FilterError
+        If an argument is out of range.
+    """
+    alpha = require("resistance", resistance, "m/kg", NOT_NEGATIVE)
+    mass = require("cake_mass", cake_mass, "kg/m2", POSITIVE)
+    resisting = drum.filtrate_per_slurry * drum.viscosity * (0.5 * alpha * mass + drum.medium_resistance)
+    return np.asarray(resisting * mass / (drum.slurry_concentration * drum.pressure_drop))
 
 
 def area(drum: DrumFilter, resistance: ArrayLike, slurry_flow: ArrayLike) -> FloatArray:
@@ -195,16 +279,16 @@ def area(drum: DrumFilter, resistance: ArrayLike, slurry_flow: ArrayLike) -> Flo
 
     Notes
     -----
-    Eq. 10 counts the slurry's whole volume as filtrate. A share ``c / (rho (1 - eps))`` of it stays in the cake as
-    crystals and liquor (12 % for the paper's alum), so that an area smaller by at most that share would do.
+    On the slurry basis, the paper's, the slurry's whole volume counts as filtrate (see the module's docstring): an area
+    smaller by at most ``c / (rho (1 - eps))`` would do. A drum of :func:`on_filtrate_basis` has that area.
     """
-    # ASSUME: filtrate volume = slurry volume, as in the paper; model_warnings says where that misleads
-    return np.asarray(_require("slurry_flow", slurry_flow, "m3/s", _POSITIVE) * _area_per_flow(drum, resistance))
+    # ASSUME: on the slurry basis, filtrate volume = slurry volume; model_warnings says where that misleads
+    return np.asarray(require("slurry_flow", slurry_flow, "m3/s", POSITIVE) * _area_per_flow(drum, resistance))
 
 
 def capacity(drum: DrumFilter, resistance: ArrayLike, filter_area: ArrayLike) -> FloatArray:
     """Slurry flow that a filter area (m2) can take, m3/s: the inverse of :func:`area`."""
-    return np.asarray(_require("filter_area", filter_area, "m2", _POSITIVE) / _area_per_flow(drum, resistance))
+    return np.asarray(require("filter_area", filter_area, "m2", POSITIVE) / _area_per_flow(drum, resistance))
 
 
 def cake_mass_per_area(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
@@ -248,17 +332,17 @@ def resistance_for_cake_share(drum: DrumFilter, share: ArrayLike) -> FloatArray:
     FilterError
         If the share is out of range or nan, or the medium has no resistance (the cake then always holds all).
     """
-    if drum.medium_resistance == 0.0:
+    if np.any(np.equal(drum.medium_resistance, 0.0)):
         raise FilterError("medium_resistance = 0 1/m: must be positive, or the cake holds all of the resistance")
-    s = _require("share", share, "", _SHARE)
-    resisting = 2.0 * drum.viscosity * drum.rotation_rate * drum.medium_resistance**2
+    s = require("share", share, "", SHARE)
+    resisting = 2.0 * drum.filtrate_per_slurry * drum.viscosity * drum.rotation_rate * drum.medium_resistance**2
     driving = drum.pressure_drop * drum.submerged_fraction * drum.slurry_concentration
     return np.asarray(resisting / driving * s / (1.0 - s) ** 2)
 
 
 def filtrate_velocity(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
-    """Superficial velocity of the filtrate while submerged, mean over the time, ``V / (f A)``, m/s."""
-    return np.asarray(1.0 / (drum.submerged_fraction * _area_per_flow(drum, resistance)))
+    """Superficial velocity of the filtrate while submerged, mean over the time, ``phi V / (f A)``, m/s."""
+    return np.asarray(drum.filtrate_per_slurry / (drum.submerged_fraction * _area_per_flow(drum, resistance)))
 
 
 def particle_reynolds(
@@ -273,9 +357,9 @@ def particle_reynolds(
     The resistance (m/kg) sets the velocity u of :func:`filtrate_velocity`; porosity in (0, 1), Sauter mean diameter d32
     (six over the crystals' specific surface) in m, density rho_l of the filtrate in kg/m3.
     """
-    size = _require("sauter_mean", sauter_mean, "m", _POSITIVE)
-    solids = 1.0 - _require("porosity", porosity, "", _FRACTION)
-    momentum = _require("liquid_density", liquid_density, "kg/m3", _POSITIVE) * filtrate_velocity(drum, resistance)
+    size = require("sauter_mean", sauter_mean, "m", POSITIVE)
+    solids = 1.0 - require("porosity", porosity, "", FRACTION)
+    momentum = require("liquid_density", liquid_density, "kg/m3", POSITIVE) * filtrate_velocity(drum, resistance)
     return np.asarray(momentum * size / (drum.viscosity * solids))
 
 
@@ -296,8 +380,30 @@ def model_warnings(drum: DrumFilter, cake: Cake, liquid_density: float = WATER_D
         _layers_warning(drum, cake),
         _reynolds_warning(drum, cake, liquid_density),
         _slurry_warning(drum, cake),
+        forming_warning(drum, cake.resistance, cake.porosity, cake.density),
     )
     return [text for text in found if text is not None]
+
+
+def forming_warning(drum: DrumFilter, resistance: float, porosity: float, density: float) -> str | None:
+    """Warn of a slurry too slow for any continuous filter, drum or belt; None where it is not.
+
+    Specific cake resistance in m/kg, crystal density in kg/m3.
+
+    Raises
+    ------
+    FilterError
+        If an argument is out of range.
+    """
+    solids = 1.0 - require("porosity", porosity, "", FRACTION)
+    mass = FORMING_THICKNESS * solids * require("density", density, "kg/m3", POSITIVE)
+    seconds = float(forming_time(drum, resistance, mass))
+    if seconds <= LONGEST_FORMING:
+        return None
+    return (
+        f"{FORMING_THICKNESS / _MILLIMETRE:g} mm of cake take {duration(seconds)} to form: over "
+        f"{duration(LONGEST_FORMING)} no continuous filter should be tried; take a batch filter"
+    )
 
 
 def design_table(
@@ -326,7 +432,7 @@ def design_table(
     FilterError
         As :func:`area` and :func:`cake_thickness`; or if the flows are neither one nor n.
     """
-    flows = _require("slurry_flow", slurry_flow, "m3/s", _POSITIVE)
+    flows = require("slurry_flow", slurry_flow, "m3/s", POSITIVE)
     if flows.shape not in ((), (len(cakes),)):
         raise FilterError(f"slurry_flow has shape {flows.shape}: must be one number or one per cake ({len(cakes)})")
     each = np.broadcast_to(flows, len(cakes))
@@ -382,8 +488,8 @@ def _reynolds_warning(drum: DrumFilter, cake: Cake, liquid_density: float) -> st
 
 
 def _slurry_warning(drum: DrumFilter, cake: Cake) -> str | None:
-    share = drum.slurry_concentration / float(_cake_density(drum, cake.porosity, cake.density))
-    if share <= MAXIMUM_CAKE_VOLUME:
+    share = float(drum.slurry_concentration / _cake_density(drum, cake.porosity, cake.density))
+    if share <= MAXIMUM_CAKE_VOLUME or drum.filtrate_per_slurry < 1.0:
         return None
     return (
         f"{share:.3g} of the slurry's volume stays in the cake (slurry of {drum.slurry_concentration:.4g} kg/m3): over "
@@ -393,40 +499,23 @@ def _slurry_warning(drum: DrumFilter, cake: Cake) -> str | None:
 
 def _area_per_flow(drum: DrumFilter, resistance: ArrayLike) -> FloatArray:
     """Area per slurry flow, s/m: the stable form of eq. 10 in the module's docstring."""
-    alpha = _require("resistance", resistance, "m/kg", _NOT_NEGATIVE)
-    if drum.medium_resistance == 0.0 and (alpha == 0.0).any():
+    alpha = require("resistance", resistance, "m/kg", NOT_NEGATIVE)
+    if np.any(np.equal(drum.medium_resistance, 0.0) & (alpha == 0.0)):
         raise FilterError("resistance = 0 m/kg: must be positive where medium_resistance = 0 1/m (nothing resists)")
     driving = 2.0 * drum.pressure_drop * drum.submerged_fraction
-    medium = drum.viscosity * drum.medium_resistance / driving
-    cake = drum.viscosity * drum.slurry_concentration * alpha / (driving * drum.rotation_rate)
+    viscosity = drum.filtrate_per_slurry * drum.viscosity
+    medium = viscosity * drum.medium_resistance / driving
+    cake = viscosity * drum.slurry_concentration * alpha / (driving * drum.rotation_rate)
     return np.asarray(np.hypot(np.sqrt(cake), medium) + medium)
 
 
 def _cake_density(drum: DrumFilter, porosity: ArrayLike, density: ArrayLike) -> FloatArray:
     """Crystals per volume of cake, kg/m3; refused where the slurry has no liquid to spare."""
-    solids = 1.0 - _require("porosity", porosity, "", _FRACTION)
-    dense = np.asarray(_require("density", density, "kg/m3", _POSITIVE) * solids)
+    solids = 1.0 - require("porosity", porosity, "", FRACTION)
+    dense = np.asarray(require("density", density, "kg/m3", POSITIVE) * solids)
     if (dense <= drum.slurry_concentration).any():
         raise FilterError(
-            f"slurry_concentration = {drum.slurry_concentration:g} kg/m3: must be below the {dense.min():g} kg/m3 of "
-            "crystals in the cake, or there is no liquid to filter off"
+            f"slurry_concentration = {np.max(drum.slurry_concentration):g} kg/m3: must be below the {dense.min():g} "
+            "kg/m3 of crystals in the cake, or there is no liquid to filter off"
         )
     return dense
-
-
-def _require(name: str, value: ArrayLike, unit: str, rule: _Rule) -> FloatArray:
-    _refuse(_problem(name, value, unit, rule))
-    return np.asarray(value, dtype=np.float64)
-
-
-def _problem(name: str, value: ArrayLike, unit: str, rule: _Rule) -> str | None:
-    """Message about the first value that a rule does not accept, None where it accepts all."""
-    values = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    bad = values[~rule.accepts(values)]
-    return f"{f'{name} = {bad[0]:g} {unit}'.rstrip()}: {rule.text}" if bad.size else None
-
-
-def _refuse(*problems: str | None) -> None:
-    found = [problem for problem in problems if problem is not None]
-    if found:
-        raise FilterError("\n".join(found))

@@ -32,7 +32,8 @@ DRUM = [
     *["--slurry-concentration-kg-m3", "200", "--pressure-drop-kPa", "53.33", "--submerged-fraction", "0.3"],
     *["--rotation-rate-rpm", "0.2", "--medium-resistance-1-m", "5e9"],
 ]
-COMMANDS = ["csd", "pack", "porosity", "permeability", "resistance", "filter-area", "test"]
+DESIGN = ["filter-batch", "deliquor", "crystallizer", "cost"]
+COMMANDS = ["csd", "pack", "porosity", "permeability", "resistance", "filter-area", *DESIGN, "test"]
 ALL_COMMANDS = [*COMMANDS, "export", "rerun"]
 BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
 
@@ -191,6 +192,89 @@ def test_a_law_decides_nothing_of_the_packings(packed: Path, capsys: Capture) ->
     assert relative == pytest.approx(CARMAN_CONSTANT_CI95 / CARMAN_CONSTANT)
 
 
+BATCH = [
+    *["filter-batch", "--resistance-m-kg", "1e10", "--porosity", "0.4", "--density-kg-m3", "1500"],
+    *["--slurry-concentration-kg-m3", "100", "--pressure-drop-kPa", "200", "--medium-resistance-1-m", "1e10"],
+    *["--turnaround-time-min", "20"],
+]
+CAKE_OF_50_UM = [
+    *["deliquor", "--resistance-m-kg", "1e9", "--porosity", "0.4", "--density-kg-m3", "1300", "--sauter-mean-um", "50"],
+    *["--cake-height-mm", "20"],
+]
+
+
+def test_filter_area_on_the_filtrate_basis_and_with_safety(capsys: Capture) -> None:
+    alum = ["--porosity", "0.293", "--density-kg-m3", "2450", "--resistance-m-kg", "1.009e8"]
+    alum += ["--slurry-flow-m3-h", "20"]
+    slurry = as_json(["filter-area", *alum, *DRUM], capsys)
+    filtrate = as_json(["filter-area", *alum, *DRUM, "--filtrate-basis", "--resistance-ci95-m-kg", "2e7"], capsys)
+    assert slurry["filter_area_m2"] / filtrate["filter_area_m2"] == pytest.approx(1.085, abs=5e-4)
+    assert slurry["filter_area_upper_m2"] is None and slurry["safety"] == ""
+    assert filtrate["filter_area_upper_m2"] == pytest.approx(3.372, abs=1e-3)
+    assert filtrate["filter_area_paper_factor_m2"] == pytest.approx(4.073, abs=1e-3)
+    assert main(["filter-area", *alum, *DRUM, "--resistance-ci95-m-kg", "2e8"]) == 0
+    printed = capsys.readouterr()
+    assert "area, paper's factor 2" in printed.out
+    assert "ends at 2.98 times the resistance found, beyond the paper's factor of 2" in printed.err
+
+
+def test_filter_area_warns_of_a_slow_slurry(capsys: Capture) -> None:
+    slow = ["--porosity", "0.4", "--density-kg-m3", "1500", "--slurry-flow-m3-h", "1", "--resistance-m-kg", "1e14"]
+    assert main(["filter-area", *slow, *DRUM]) == 0
+    assert "warning: 3 mm of cake take " in capsys.readouterr().err
+
+
+def test_filter_batch(capsys: Capture) -> None:
+    found = as_json([*BATCH, "--slurry-flow-m3-h", "1"], capsys)
+    back = as_json([*BATCH, "--filter-area-m2", str(found["filter_area_m2"])], capsys)
+    assert back["slurry_flow_m3_h"] == pytest.approx(1.0)
+    assert found["cake_height_mm"] == found["best_height_mm"]
+    assert main([*BATCH, "--slurry-flow-m3-h", "1", "--cake-height-mm", "50", "--height-limit-mm", "40"]) == 0
+    printed = capsys.readouterr()
+    assert re.search(r"cake height +50 mm\nbest cake height +40 mm", printed.out)
+    assert printed.err == "warning: the cake is higher than --height-limit-mm\n"
+
+
+def test_deliquor_and_its_inverse(capsys: Capture) -> None:
+    found = as_json([*CAKE_OF_50_UM, "--pressure-drop-kPa", "50", "--moisture", "0.15"], capsys)
+    back = as_json([*CAKE_OF_50_UM, "--pressure-drop-kPa", "50", "--time-min", str(found["time_min"])], capsys)
+    assert back["moisture"] == pytest.approx(0.15)
+    assert main([*CAKE_OF_50_UM, "--pressure-drop-kPa", "50", "--time-min", "1e6"]) == 0
+    printed = capsys.readouterr()
+    assert "within the correlation's error" in printed.out
+    assert printed.err == "warning: the time is outside of the correlation's range\n"
+
+
+def test_a_crystallizers_product_goes_on_as_a_file(capsys: Capture, tmp_path: Path) -> None:
+    table = str(tmp_path / "product.csv")
+    fines = ["--fines-ratio", "5", "--fines-size-um", "50"]
+    found = as_json(["crystallizer", *ALUM, *fines, "--output", table], capsys)
+    again = as_json(["csd", table], capsys)
+    assert again["sauter_mean_um"] == pytest.approx(found["sauter_mean_um"], rel=0.01)
+    assert found["sauter_mean_um"] > as_json(["crystallizer", *ALUM], capsys)["sauter_mean_um"]
+    stages = ["--residence-time-min", "5,10", "--slurry-concentration-kg-m3", "100,200"]
+    assert main(["crystallizer", "--kinetics", "ammonium_alum", *stages]) == 0
+    printed = capsys.readouterr()
+    assert "growth rate, stage 2" in printed.out
+    assert printed.err == (
+        "warning: --residence-time-min = 5, 10: the kinetics ammonium_alum are meant for 15 to 60 min\n"
+    )
+
+
+def test_costs_stand_side_by_side(capsys: Capture) -> None:
+    drum = ["cost", "--equipment", "drum_filter", "--cost-index", "800", "--filter-area-m2"]
+    turton, seider = as_json([*drum, "3.44"], capsys)["costs"]  # type: ignore[misc]
+    assert (turton["correlation"], seider["correlation"]) == ("drum_filter_turton", "drum_filter_seider")
+    assert turton["purchase"] == pytest.approx(seider["purchase"], rel=0.02)
+    assert main([*drum, "100", "--currency-per-usd", "0.9"]) == 0
+    printed = capsys.readouterr()
+    assert re.search(r"drum filter, Turton: bare module +\d+ thousand\n", printed.out)
+    assert "warning: drum_filter_seider: outside of its range, 0.929 to 74.32 m2" in printed.err
+    forced = ["--equipment", "forced_circulation_crystallizer", "--crystals-kg-s", "1"]
+    assert main(["cost", *forced, "--cost-index", "525"]) == 0
+    assert "source states no range" in capsys.readouterr().err
+
+
 def test_filter_area_and_its_inverse(capsys: Capture) -> None:
     area = as_json(["filter-area", "--resistance-m-kg", "1.009e8", "--slurry-flow-m3-h", "20", *DRUM], capsys)
     assert area["filter_area_m2"] == pytest.approx(3.44, abs=5e-3)
@@ -228,6 +312,52 @@ def test_filter_area_and_its_inverse(capsys: Capture) -> None:
         ),
         (["filter-area", "--resistance-m-kg", "1e8", *DRUM], "one of --slurry-flow-m3-h and --filter-area-m2"),
         (["filter-area", "--resistance-m-kg", "x", *DRUM], "--resistance-m-kg = x: must be a number"),
+        (
+            ["filter-area", "--resistance-m-kg", "1e8", *DRUM, "--slurry-flow-m3-h", "1", "--filtrate-basis"],
+            "--filtrate-basis needs porosity and --density-kg-m3",
+        ),
+        (
+            ["filter-area", "--resistance-m-kg", "1e8", *DRUM, "--filter-area-m2", "1", "--resistance-ci95-m-kg", "1"],
+            "--resistance-ci95-m-kg goes with --slurry-flow-m3-h",
+        ),
+        (BATCH, "one of --slurry-flow-m3-h and --filter-area-m2"),
+        (
+            [*BATCH, "--slurry-flow-m3-h", "1", "--turnaround-time-min", "0"],
+            "--turnaround-time-min or --deliquoring-time-min must be above 0, or ever thinner cakes are better",
+        ),
+        ([*CAKE_OF_50_UM, "--pressure-drop-kPa", "50"], "exactly one of --time-min and moisture"),
+        (
+            [*CAKE_OF_50_UM, "--pressure-drop-kPa", "5", "--time-min", "1"],
+            "--pressure-drop-kPa = 5: must be above 9.936 kPa, up to which no gas enters the pores",
+        ),
+        (
+            [*CAKE_OF_50_UM, "--pressure-drop-kPa", "50", "--moisture", "0.05"],
+            "--moisture = 0.05: must be above 0.08965, which no time of deliquoring undercuts",
+        ),
+        (["crystallizer", *ALUM, "--fines-ratio", "5"], "--fines-ratio above 1 and --fines-size-um go together"),
+        (
+            ["crystallizer", "--kinetics", "alum", *ALUM[2:]],
+            "kinetics = 'alum': no such kinetics; allowed: ammonium_alum, potassium_nitrate",
+        ),
+        (
+            ["crystallizer", *ALUM[:2], "--residence-time-min", "5,5", "--slurry-concentration-kg-m3", "200"],
+            "2 residence times and 1 slurry concentrations",
+        ),
+        (["crystallizer", *ALUM, "--output", ""], "must be the name of a file"),
+        (
+            ["cost", "--equipment", "drum_filter", "--cost-index", "800"],
+            "--filter-area-m2: must be given for a drum_filter",
+        ),
+        (
+            ["cost", "--equipment", "drum_filter", "--cost-index", "800", "--crystals-kg-s", "3"],
+            "--crystals-kg-s = 3: is no size of a drum_filter",
+        ),
+        (["cost", "--equipment", "drum", "--cost-index", "800"], "equipment = 'drum': allowed: drum_filter,"),
+        (
+            ["cost", "--equipment", "leaf_filter", "--cost-index", "800", "--filter-area-m2", "1e4"],
+            "size = 10000 m2: leaf_filter_turton is of 0.6 to 235 m2",
+        ),
+        (["cost", "--equipment", "x", "--cost-index", "1", "--costs-file", "no/such.yaml"], "cannot be read"),
         (["porosity", "no/such.npz"], "cannot be read"),
         (["porosity"], "NPZ"),
         (["permeability"], "NPZ"),

@@ -23,13 +23,16 @@ from filtercake.filtration.drum_filter import (
     Cake,
     DrumFilter,
     area,
+    belt,
     cake_mass_per_area,
     cake_thickness,
     capacity,
     design_table,
     filtrate_velocity,
+    forming_time,
     medium_share,
     model_warnings,
+    on_filtrate_basis,
     particle_reynolds,
     resistance_for_cake_share,
 )
@@ -64,6 +67,7 @@ filters = st.builds(
     medium_resistance=st.floats(1e8, 1e12),
     viscosity=st.floats(1e-4, 1.0),
     slurry_concentration=st.floats(1.0, 500.0),
+    filtrate_per_slurry=st.floats(0.1, 1.0),
 )
 
 
@@ -129,8 +133,8 @@ def test_cake_of_the_paper_by_hand() -> None:
 def test_area_is_eq_10_as_printed(drum: DrumFilter, alpha: float, flow: float) -> None:
     with localcontext() as context:
         context.prec = 60  # the printed form cancels
-        dp, f, n, rm, mu, c = (Decimal(v) for v in dataclasses.astuple(drum))
-        a, v = Decimal(alpha), Decimal(flow)
+        dp, f, n, rm, mu, c, phi = (Decimal(v) for v in dataclasses.astuple(drum))
+        a, v, c = Decimal(alpha), phi * Decimal(flow), c / phi  # filtrate, and crystals per volume of it
         root = (2 * c * a * dp * f * n / mu + (n * rm) ** 2).sqrt()
         printed = float(a * c * v / (root - n * rm))
     assert float(area(drum, alpha, flow)) == pytest.approx(printed, rel=1e-13)
@@ -223,6 +227,7 @@ def test_dimensions(drum: DrumFilter, alpha: float, flow: float, m: float, kg: f
         medium_resistance=drum.medium_resistance / m,
         viscosity=drum.viscosity * kg / (m * s),
         slurry_concentration=drum.slurry_concentration * kg / m**3,
+        filtrate_per_slurry=drum.filtrate_per_slurry,
     )
     beta, size, rho = alpha * m / kg, 1e-4, 1000.0
     pairs = [
@@ -330,11 +335,118 @@ def test_slurry_warning_at_its_limit() -> None:
 
 
 def test_area_is_too_large_by_no_more_than_the_slurry_in_the_cake() -> None:
-    # the same balance with the filtrate's own volume: resistance terms times phi
     phi = 1.0 - 200.0 / (ALUM * (1.0 - 0.293))
-    exact = float(area(changed(viscosity=1e-3 * phi), 1.009e8, FLOW))
-    assert phi == pytest.approx(0.88, abs=0.005)
+    exact = float(area(on_filtrate_basis(PAPER, 0.293, ALUM), 1.009e8, FLOW))
+    assert phi == pytest.approx(0.885, abs=0.0005)
     assert phi < exact / float(area(PAPER, 1.009e8, FLOW)) < 1.0
+
+
+# --- slurry or filtrate ---
+
+
+def test_the_filtrate_basis_closes_the_volume() -> None:
+    # a cubic metre of slurry: 200 kg of crystals in 200 / (2450 * 0.707) m3 of full cake, and the rest is filtrate
+    drum = on_filtrate_basis(PAPER, 0.293, ALUM)
+    cake = 200.0 / ALUM / (1.0 - 0.293)
+    assert float(drum.filtrate_per_slurry) + cake == pytest.approx(1.0, rel=1e-14)
+    # Ruth's law for that filtrate alone, V m3 of it per turn and m2, gives the time submerged
+    w = float(cake_mass_per_area(drum, 1.009e8))
+    volume = w / 200.0 * float(drum.filtrate_per_slurry)
+    seconds = 1e-3 / 53.32e3 * (1.009e8 * (w / volume) * volume**2 / 2.0 + 5e9 * volume)
+    assert seconds == pytest.approx(0.3 * 300.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("porosity", "alpha", "percent"), [(row[1], row[2], p) for row, p in zip(FIG_14, (8.5, 8.8, 8.9, 9.1), strict=True)]
+)
+def test_the_papers_areas_are_larger_by_8_to_9_percent(porosity: float, alpha: float, percent: float) -> None:
+    larger = float(area(PAPER, alpha, FLOW) / area(on_filtrate_basis(PAPER, porosity, ALUM), alpha, FLOW)) - 1.0
+    assert 100.0 * larger == pytest.approx(percent, abs=0.05)
+
+
+def test_a_dilute_slurry_is_the_same_on_both_bases() -> None:
+    thin = changed(slurry_concentration=1e-6)
+    both = [float(area(drum, 1e9, FLOW)) for drum in (thin, on_filtrate_basis(thin, 0.3, ALUM))]
+    assert both[0] == pytest.approx(both[1], rel=1e-8)
+
+
+def test_many_cakes_at_once_on_the_filtrate_basis() -> None:
+    porosity, alpha = np.array([0.293, 0.5]), np.array([1.009e8, 2e8])
+    found = area(on_filtrate_basis(PAPER, porosity, ALUM), alpha, FLOW)
+    for k in range(2):
+        assert float(found[k]) == float(area(on_filtrate_basis(PAPER, porosity[k], ALUM), alpha[k], FLOW))
+    with pytest.raises(FilterError, match=r"slurry_concentration = 1300 kg/m3: must be below the 1225 kg/m3"):
+        on_filtrate_basis(changed(slurry_concentration=1300.0), porosity, ALUM)
+
+
+# --- many drums at once ---
+
+
+def test_drums_of_many_speeds_and_pressures() -> None:
+    rates, drops = np.array([1e-3, 1e-2]), np.array([[2e4], [5e4], [8e4]])
+    drums = changed(rotation_rate=rates, pressure_drop=drops)
+    found, share = area(drums, 1e9, FLOW), resistance_for_cake_share(drums, 0.5)
+    assert found.shape == share.shape == (3, 2)
+    one = changed(rotation_rate=1e-2, pressure_drop=8e4)
+    assert float(found[2, 1]) == float(area(one, 1e9, FLOW))
+    assert float(share[2, 1]) == float(resistance_for_cake_share(one, 0.5))
+    with pytest.raises(FilterError, match=r"rotation_rate = -1 1/s"):
+        changed(rotation_rate=np.array([1.0, -1.0]))
+    with pytest.raises(FilterError, match=r"resistance = 0 m/kg: must be positive where medium_resistance = 0"):
+        area(changed(medium_resistance=np.array([1e9, 0.0])), 0.0, FLOW)
+
+
+# --- belts ---
+
+
+@given(filters, resistances, st.floats(0.05, 0.95), st.floats(1e-3, 1.0), st.floats(0.5, 50.0))
+def test_a_belt_forms_its_cake_in_the_time_on_its_forming_zone(
+    drum: DrumFilter, alpha: float, share: float, speed: float, length: float
+) -> None:
+    unrolled = belt(drum, share, speed, length)
+    w = float(cake_mass_per_area(unrolled, alpha))
+    assert float(forming_time(unrolled, alpha, w)) == pytest.approx(share * length / speed, rel=1e-11)
+    # mass balance: what the belt carries off is what the slurry brings
+    width = float(area(unrolled, alpha, FLOW)) / length
+    assert w * speed * width == pytest.approx(drum.slurry_concentration * FLOW, rel=1e-12)
+
+
+def test_a_belt_is_the_drum_of_its_share_and_turns() -> None:
+    assert belt(PAPER, 0.3, 0.02, 6.0) == changed(rotation_rate=1.0 / 300.0)
+    for name, values in {"form_share": (1.0, 0.02, 6.0), "belt_speed": (0.3, 0.0, 6.0)}.items():
+        with pytest.raises(FilterError, match=f"{name} = "):
+            belt(PAPER, *values)
+    with pytest.raises(FilterError, match="belt_length = -1 m"):
+        belt(PAPER, 0.3, 0.02, -1.0)
+
+
+# --- the time a cake takes to form ---
+
+
+@given(filters, resistances)
+def test_the_cake_of_a_turn_forms_in_the_time_submerged(drum: DrumFilter, alpha: float) -> None:
+    w = cake_mass_per_area(drum, alpha)
+    assert float(forming_time(drum, alpha, w)) == pytest.approx(
+        float(drum.submerged_fraction / drum.rotation_rate), rel=1e-11
+    )
+
+
+def test_a_slurry_too_slow_for_any_continuous_filter_is_said() -> None:
+    # 3 mm are w = 3e-3 * 2450 * 0.707 kg/m2; without a medium they take mu alpha w^2 / (2 c dP)
+    w = 3e-3 * ALUM * (1.0 - 0.293)
+    at_limit = 300.0 * 2.0 * 200.0 * 53.32e3 / (1e-3 * w**2)
+    drum = changed(CALM, medium_resistance=0.0)
+    for factor, expected in ((0.999, False), (1.001, True)):
+        found = model_warnings(drum, alum_cake(resistance=factor * at_limit, largest=1e-6))
+        assert [text for text in found if "no continuous filter" in text] == [
+            "3 mm of cake take 5 min to form: over 5 min no continuous filter should be tried; take a batch filter"
+        ] * expected
+
+
+def test_a_drum_on_the_filtrate_basis_is_not_warned_about_its_slurry() -> None:
+    thick = changed(CALM, slurry_concentration=400.0)
+    assert sum("slurry's volume" in text for text in model_warnings(thick, alum_cake())) == 1
+    assert not any("slurry's" in text for text in model_warnings(on_filtrate_basis(thick, 0.293, ALUM), alum_cake()))
 
 
 def test_every_warning_is_said() -> None:
@@ -399,6 +511,8 @@ def test_design_table_refuses_flows_that_do_not_match() -> None:
         ("medium_resistance", -1.0, "medium_resistance = -1 1/m: must be zero or positive"),
         ("viscosity", 0.0, "viscosity = 0 Pa s: must be positive"),
         ("slurry_concentration", 0.0, "slurry_concentration = 0 kg/m3: must be positive"),
+        ("filtrate_per_slurry", 1.01, "filtrate_per_slurry = 1.01: must be above 0 and at most 1"),
+        ("filtrate_per_slurry", 0.0, "filtrate_per_slurry = 0: must be above 0"),
         *((field.name, math.nan, f"{field.name} = nan") for field in dataclasses.fields(DrumFilter)),
     ],
 )
