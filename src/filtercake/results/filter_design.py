@@ -33,7 +33,7 @@ def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFra
     if study.filter is None or study.crystallizer is None:
         raise FilterError("the study has no filter: add the sections crystallizer and filter")
     drum = drum_of(study)
-    own = drum.pressure_drop / KILOPASCAL
+    own = float(drum.pressure_drop) / KILOPASCAL
     pressures = summary["pressure_kPa"].astype(np.float64).fillna(own)
     parts = [
         _design(study, replace(drum, pressure_drop=float(pressure) * KILOPASCAL), csds, summary[pressures == pressure])
