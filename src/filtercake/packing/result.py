@@ -102,10 +102,14 @@ class Packing:
         """
         with publish(npz) as temporary:
             with temporary.open("wb") as stream:
-                np.savez(stream, position=self.position, radius=self.radius, length=np.float64(self.length))
+                np.savez(stream, position=self.position, radius=self.radius, **self._room())
             checksum = sha256(temporary)
         write_json(npz.with_suffix(".json"), sealed({**self.diagnostics, "sha256": checksum}))
         return checksum
+
+    def _room(self) -> dict[str, Any]:
+        """Where the spheres are: a file without its record must still tell a cell from a bed on a floor."""
+        return {"box": np.full(3, self.length)} if self.is_cell else {"length": np.float64(self.length)}
 
     @classmethod
     def load(cls, npz: Path) -> Packing:
@@ -121,8 +125,9 @@ class Packing:
             if sha256(npz) != record.get("sha256"):
                 raise PackingRejected([f"{npz.name} is not the file that was accepted (checksum differs)"])
             with np.load(npz) as data:
-                return cls(data["position"], data["radius"], float(data["length"]), record)
-        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+                length = data["box"][0] if "box" in data.files else data["length"]
+                return cls(data["position"], data["radius"], float(length), record)
+        except (OSError, EOFError, ValueError, KeyError, IndexError, zipfile.BadZipFile) as error:
             raise PackingRejected([f"{npz.name} cannot be read: {error}"]) from None
 
 

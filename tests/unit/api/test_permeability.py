@@ -102,7 +102,8 @@ def test_file_packing_arrays_and_a_file_without_a_record_give_the_same(packed: P
     shutil.copy(packed / "r0.npz", bare)
     bare.with_suffix(".json").write_text('{"program": "of my own"}', encoding="utf-8")
     packing = Packing.load(packed / "r0.npz")
-    arrays = {"position": packing.position, "radius": packing.radius, "length": packing.length}
+    assert packing.is_cell
+    arrays = {"position": packing.position, "radius": packing.radius, "box": np.full(3, packing.length)}
     found = [
         api.permeability(source, accuracy=0.1, density_kg_m3=1180)
         for source in (packed / "r0.npz", str(bare), packing, arrays)

@@ -473,8 +473,14 @@ def test_porosity_in_words(packed: Path, capsys: Capture) -> None:
     ("extra", "said"),
     [
         (["--particles", "10"], "--particles = 10: must be greater than or equal to 50"),
-        (["--cohesion-kJ-m3", "500"], "--cohesion-kJ-m3 = 500: must be at most"),
-        (["--time-step-us", "5"], "--time-step-us = 5: must be below the Rayleigh time step"),
+        (["--protocol", "gravity", "--cohesion-kJ-m3", "500"], "--cohesion-kJ-m3 = 500: must be at most"),
+        (["--cohesion-kJ-m3", "500"], "--cohesion-kJ-m3 = 500: holds 23.8 kPa; must hold at most 15.6 kPa"),
+        (
+            ["--pressure-kPa", "900"],
+            "--pressure-kPa = 900: must be at most 469 kPa at E = 3 GPa (--youngs-modulus-GPa)",
+        ),
+        (["--protocol", "gravity", "--time-step-us", "5"], "--time-step-us = 5: must be below the Rayleigh time step"),
+        (["--time-step-us", "5"], "--time-step-us = 5: must be at most 0.5 of the Rayleigh time step"),
         (["--engine", "magic"], "--engine = magic: allowed:"),
         (["--replicates", "2.5"], "--replicates = 2.5: must be a whole number"),
         (["--output", "{other}"], "must be new, empty, or a folder of packings; it holds mine.txt"),
@@ -490,7 +496,7 @@ def test_pack_refuses_in_one_line(extra: list[str], said: str, tmp_path: Path, c
 
 def test_a_bed_that_fails_has_a_reason_and_status_1(tmp_path: Path, capsys: Capture) -> None:
     few = ["pack", "--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200"]
-    few += ["--friction", "0.3", "--cohesion-kJ-m3", "0", "--max-fall-times", "1"]
+    few += ["--protocol", "gravity", "--friction", "0.3", "--cohesion-kJ-m3", "0", "--max-fall-times", "1"]
     assert main([*few, "--engine", "embedded", "--replicates", "1", "--output", str(tmp_path / "x"), "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["n"], found["n_failed"], found["porosity"]) == (0, 1, None)
