@@ -268,7 +268,7 @@ def cost(means: pd.DataFrame) -> pd.DataFrame:
     rows["settled"] = rows["case"].str.contains("gravity")
     rows["seconds_for"] = rows["seconds"] * (quantile() * rows["sd"] / HALF_WIDTH) ** 2
     rows["gain"], rows["gain_factor"] = math.nan, math.nan
-    for material in GAIN:
+    for material in rows["material"].unique().tolist():
         beds = rows[(rows["material"] == material) & rows["settled"]]
         best = beds.sort_values("seconds_for").iloc[0]
         cells = rows.index[(rows["material"] == material) & ~rows["settled"]]
