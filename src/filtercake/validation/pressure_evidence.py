@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
@@ -48,6 +47,7 @@ HALF_WIDTH: Final = 0.002
 """Half-width of the 95 % interval of the porosity for which costs are compared."""
 GAIN: Final = {"pmma": 2.0, "alum": 5.0}
 """How many times cheaper than a settled bed a cell should be."""
+QUANTITIES: Final = {"porosity": "porosity", "backbone": "contacts without rattlers"}
 CONTACTS: Final = (6.0, 6.2)
 """Mean number of contacts without rattlers, without friction: 6 in the limit of no stress."""
 RANDOM_CLOSE: Final = 0.36
@@ -345,66 +345,79 @@ def unmet(cells: pd.DataFrame) -> tuple[list[str], int]:
     """Say which expectations do not hold, a sentence each, and how many there are in all."""
     means = averages(cells)
     said = [
-        (
-            bool(row["holds"]),
-            f"{row['label']}: {row['quantity']} {row['value']:.4g}, expected {row['expected']:.4g} within "
-            f"{row['tolerance']:g} ({row['source']})",
-        )
-        for row in _rows(references(means))
-    ]
-    said += [
-        (
-            low <= row["solids"] <= high,
-            f"solids at friction {row['friction']:g}: {row['solids']:.3f}, {low} to {high} expected",
-        )
-        for row in _rows(friction_series(means))
-        for friction, low, high in ((0.0, CLOSE - 0.003, CLOSE + 0.003), (1.0, *LOOSE))
-        if row["friction"] == friction
-    ]
-    said += [
-        (
-            bool(row["holds"]),
-            f"30 and 50 kJ/m3 at x = {row['load']:g}, friction {row['friction']:g}: {row['change']:+.4f} apart, "
-            f"at most {row['limit']:g} expected",
-        )
-        for row in _rows(collapse(cells))
-    ]
-    for row in _rows(paths(cells)):
-        where = f"x = {row['load']:g}, friction {row['friction']:g}"
-        said += [
-            (bool(row["apart_holds"]), f"cohesion weakened against stress raised, {where}: {row['apart']:+.4f}"),
-        ]
-        if math.isfinite(row["ahead"]):
-            said.append((bool(row["ahead_holds"]), f"pressed at once against led, {where}: {row['ahead']:+.4f}"))
-    said += _unmet_changes(changes(cells, INVARIANCE))
-    spread = means.set_index("case").loc["pmma_cell_2000"]
-    said.append(
-        (bool(spread["sd"] <= NARROW), f"spread of one cell of 2000: {spread['sd']:.4f}, at most {NARROW} expected")
-    )
-    said += [
-        (
-            bool(row["holds"]),
-            f"{row['label']}: {row['gain']:.2g} times cheaper than a settled bed, at least {row['wanted']:g} expected",
-        )
-        for row in _rows(gains(cost(means)))
+        *_said_of_references(means),
+        *_said_of_friction(means),
+        *_said_of_loads(cells),
+        *_said_of_changes(changes(cells, INVARIANCE)),
+        *_said_of_cost(means),
     ]
     return [text for holds, text in said if not holds], len(said)
 
 
-def _unmet_changes(table: pd.DataFrame) -> list[tuple[bool, str]]:
+_Said = list[tuple[bool, str]]
+"""Whether an expectation holds, and what to say if it does not."""
+
+
+def _said_of_references(means: pd.DataFrame) -> _Said:
+    return [
+        (
+            row["holds"],
+            f"{row['label']}: {QUANTITIES[row['quantity']]} {row['value']:.4g}, expected {row['expected']:.4g} within "
+            f"{row['tolerance']:.2g} ({row['source']})",
+        )
+        for row in _rows(references(means))
+    ]
+
+
+def _said_of_friction(means: pd.DataFrame) -> _Said:
+    series = {row["friction"]: row["solids"] for row in _rows(friction_series(means))}
+    return [
+        (
+            low <= series[friction] <= high,
+            f"solids at friction {friction:g}: {series[friction]:.3f}, {low} to {high} expected",
+        )
+        for friction, low, high in ((0.0, CLOSE - 0.003, CLOSE + 0.003), (1.0, *LOOSE))
+    ]
+
+
+def _said_of_loads(cells: pd.DataFrame) -> _Said:
     said = []
-    for row in _rows(table):
-        where = f"friction {row['friction']:g}, {row['label']}"
-        if math.isfinite(row["ci95"]):
-            said.append(
-                (
-                    bool(row["holds"]),
-                    f"{where}: {row['change']:+.4f} +- {row['ci95']:.4f}, at most {row['limit']:g} expected",
-                )
-            )
-        said.append((bool(row["se"] <= SHARP), f"{where}: standard error {row['se']:.4f}, at most {SHARP} wanted"))
+    for row in _rows(collapse(cells)):
+        where = f"x = {row['load']:g}, friction {row['friction']:g}"
+        said.append((row["holds"], _too_far(f"30 and 50 kJ/m3, {where}", row["change"], row["ci95"], row["limit"])))
+    for row in _rows(paths(cells)):
+        where = f"x = {row['load']:g}, friction {row['friction']:g}"
+        name = f"cohesion weakened against stress raised, {where}"
+        said.append((row["apart_holds"], _too_far(name, row["apart"], row["apart_ci95"], row["limit"])))
+        if math.isfinite(row["ahead"]):
+            name = f"pressed at once against led, {where}"
+            said.append((row["ahead_holds"], _too_far(name, row["ahead"], row["ahead_ci95"], row["limit"])))
     return said
 
 
-def _rows(table: pd.DataFrame) -> Iterable[dict[str, Any]]:
+def _said_of_changes(table: pd.DataFrame) -> _Said:
+    said = []
+    for row in _rows(table):
+        where = f"{row['label']}, friction {row['friction']:g}"
+        if math.isfinite(row["ci95"]):
+            said.append((row["holds"], _too_far(where, row["change"], row["ci95"], row["limit"])))
+        said.append((row["se"] <= SHARP, f"{where}: standard error {row['se']:.4f}, at most {SHARP} wanted"))
+    return said
+
+
+def _said_of_cost(means: pd.DataFrame) -> _Said:
+    costs = cost(means)
+    spread = float(costs.loc[costs["case"] == "pmma_cell_2000", "sd"].iloc[0])
+    said = [(spread <= NARROW, f"standard deviation of one cell of 2000: {spread:.4f}, at most {NARROW} expected")]
+    for row in _rows(gains(costs)):
+        name = f"{row['label']}: {row['gain']:.2g} times cheaper than a settled bed"
+        said.append((row["holds"], f"{name}, at least {row['wanted']:g} wanted"))
+    return said
+
+
+def _too_far(name: str, change: float, ci95: float, limit: float) -> str:
+    return f"{name}: {change:+.4f} +- {ci95:.4f}, at most {limit} expected"
+
+
+def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
