@@ -16,7 +16,7 @@ from filtercake.user_files import templates
 from filtercake.validation import pressure_evidence, resistance_law
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
 from filtercake.validation.permeability import BED, CELL, LATTICE, LAYERED, known_constant
-from filtercake.validation.pressure import GRAVITY_BED, INVARIANCE, MODULUS, PATH_STRESS
+from filtercake.validation.pressure import GRAVITY_BED, INVARIANCE, MODULUS, PATH_STRESS, PATHS
 from filtercake.validation.stability import OUTCOMES, UNDECIDED, families, undetected, wrong
 
 INTERIOR, COUNT = "interior slab", "count"
@@ -212,6 +212,8 @@ def pressure(template: Path, cells: pd.DataFrame) -> str:
         scaling=_records(pressure_evidence.mass_scaling(cells)),
         half_width=pressure_evidence.HALF_WIDTH,
         modulus=MODULUS,
+        isostatic=pressure_evidence.contacts_without_stress(means),
+        one={row["case"]: row for row in _records(means[means["section"] != PATHS])},
         path_stress=PATH_STRESS,
     )
 

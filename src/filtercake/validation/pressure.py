@@ -67,8 +67,8 @@ PATIENCE: Final = 800_000
 """Time steps that cells without mass scaling may take."""
 DENSITY: Final = 1180.0
 """Of all cells, kg/m3: it sets the unit of time and nothing else."""
-FEWEST_CONTACTS: Final = 4
-"""Contacts of a sphere that is no rattler."""
+FEWEST_CONTACTS: Final = (4, 2)
+"""Contacts of a sphere that is no rattler, without and with friction."""
 COLUMNS: Final = (
     "section",
     "case",
@@ -430,7 +430,8 @@ def _asked(scene: CellScene) -> dict[str, Any]:
 
 def _row(scene: CellScene, found: PressedCell, seconds: float) -> dict[str, Any]:
     contacts = _contacts(found.position, found.radius, found.length)
-    coordination, rattlers = backbone(contacts, found.radius.size)
+    fewest = FEWEST_CONTACTS[scene.friction > 0.0]
+    coordination, rattlers = backbone(contacts, found.radius.size, fewest)
     return {
         **_asked(scene),
         "porosity": found.last.rigid_porosity,
@@ -467,17 +468,17 @@ def _contacts(position: FloatArray, radius: FloatArray, length: float) -> IntArr
     return np.concatenate(found)
 
 
-def backbone(pairs: IntArray, spheres: int) -> tuple[float, float]:
+def backbone(pairs: IntArray, spheres: int, fewest: int) -> tuple[float, float]:
     """Mean number of contacts without rattlers, and the share of rattlers.
 
-    Spheres with less than ``FEWEST_CONTACTS`` contacts are taken away until none is left.
+    Spheres with less than ``fewest`` contacts are taken away until none is left.
 
     Parameters
     ----------
     pairs : ndarray, shape (m, 2)
         Spheres in contact.
-    spheres : int
-        Number of spheres.
+    spheres, fewest : int
+        Number of spheres; contacts of one that is no rattler.
 
     Returns
     -------
@@ -487,7 +488,7 @@ def backbone(pairs: IntArray, spheres: int) -> tuple[float, float]:
     left = pairs
     while True:
         counts = np.bincount(left.ravel(), minlength=spheres)
-        loose = (counts > 0) & (counts < FEWEST_CONTACTS)
+        loose = (counts > 0) & (counts < fewest)
         if not loose.any():
             break
         left = left[~loose[left].any(axis=1)]

@@ -47,6 +47,8 @@ HALF_WIDTH: Final = 0.002
 """Half-width of the 95 % interval of the porosity for which costs are compared."""
 GAIN: Final = {"pmma": 2.0, "alum": 5.0}
 """How many times cheaper than a settled bed a cell should be."""
+STRESSES: Final = ("one_size_low", "one_size", "one_size_high")
+"""Cases of one size by rising stress."""
 QUANTITIES: Final = {"porosity": "porosity", "backbone": "contacts without rattlers"}
 CONTACTS: Final = (6.0, 6.2)
 """Mean number of contacts without rattlers, without friction: 6 in the limit of no stress."""
@@ -153,6 +155,17 @@ def _distributions() -> list[tuple[str, CrystalSizeDistribution, int]]:
         ("pmma_25_75", pmma(0.25), 2000),
         ("alum", alum(), ALUM_SPHERES),
     ]
+
+
+def contacts_without_stress(means: pd.DataFrame) -> float:
+    """Extrapolate the contacts of one size without rattlers to no stress, straight in the cube root of the stress.
+
+    Contacts of Hertz overlap by the power 2/3 of the stress, and new ones come with the root of the overlap.
+    """
+    rows = means[means["case"].isin(STRESSES)]
+    return float(
+        np.polyfit(np.cbrt(rows["stress_Pa"].to_numpy(np.float64)), rows["backbone"].to_numpy(np.float64), 1)[1]
+    )
 
 
 def friction_series(means: pd.DataFrame) -> pd.DataFrame:

@@ -127,20 +127,23 @@ def test_a_cell_that_cannot_be_made_is_a_row_with_its_reason() -> None:
 def test_the_contacts_of_a_lattice_are_counted_across_the_sides() -> None:
     place = np.stack(np.meshgrid(*[np.arange(3.0)] * 3), axis=-1).reshape(-1, 3)
     pairs = pressure._contacts(place, np.full(27, 0.501), 3.0)
-    assert pressure.backbone(pairs, 27) == (6.0, 0.0)
+    assert pressure.backbone(pairs, 27, 4) == (6.0, 0.0)
     # a small sphere in the middle of each cube touches eight
     both = np.concatenate([place, place + 0.5])
     radius = np.concatenate([np.full(27, 0.501), np.full(27, 0.366)])
-    coordination, rattlers = pressure.backbone(pressure._contacts(both, radius, 3.0), 54)
+    coordination, rattlers = pressure.backbone(pressure._contacts(both, radius, 3.0), 54, 4)
     assert (coordination, rattlers) == (11.0, 0.0)
 
 
 def test_rattlers_are_taken_away_until_none_is_left() -> None:
     clique = [(a, b) for a in range(5) for b in range(a)]
     chain = [(5, 4), (6, 5), (7, 6), (7, 5), (7, 4)]
-    assert pressure.backbone(np.array(clique + chain), 10) == (4.0, 0.5)
-    coordination, rattlers = pressure.backbone(np.array(chain), 10)
+    assert pressure.backbone(np.array(clique + chain), 10, 4) == (4.0, 0.5)
+    coordination, rattlers = pressure.backbone(np.array(chain), 10, 4)
     assert math.isnan(coordination) and rattlers == 1.0
+    # with friction two contacts hold a sphere
+    coordination, rattlers = pressure.backbone(np.array([*chain, (9, 8)]), 10, 2)
+    assert coordination == pytest.approx(10.0 / 4.0) and rattlers == pytest.approx(0.6)
 
 
 def test_rejected_packings_count_but_take_no_part() -> None:
