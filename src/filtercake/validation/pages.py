@@ -192,7 +192,7 @@ def pressure(template: Path, cells: pd.DataFrame) -> str:
     See :func:`filtercake.validation.pressure.compute` and :func:`filtercake.validation.pressure_evidence.read_cells`.
     """
     means = pressure_evidence.averages(cells)
-    costs = pressure_evidence.cost(means)
+    costs = pressure_evidence.cost(cells)
     unmet, expected = pressure_evidence.unmet(cells)
     return _render(
         template,
@@ -212,6 +212,7 @@ def pressure(template: Path, cells: pd.DataFrame) -> str:
         scaling=_records(pressure_evidence.mass_scaling(cells)),
         half_width=pressure_evidence.HALF_WIDTH,
         modulus=MODULUS,
+        spreads=pressure_evidence.cell_spreads(cells),
         isostatic=pressure_evidence.contacts_without_stress(means),
         one={row["case"]: row for row in _records(means[means["section"] != PATHS])},
         path_stress=PATH_STRESS,

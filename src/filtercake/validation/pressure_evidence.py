@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +17,7 @@ import pandas as pd
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing.analytic_models import farr_groot
 from filtercake.packing.representation import merge_rare
-from filtercake.statistics import difference_half_width, quantile, standard_error
+from filtercake.statistics import Spread, pooled_spread, quantile, standard_error
 from filtercake.units import FloatArray
 from filtercake.validation.pressure import (
     ALUM_SPHERES,
@@ -35,6 +36,8 @@ from filtercake.validation.pressure import (
 
 CELL_COLUMNS: Final = ("section", "case", "label", "spheres", "friction", "cohesion_kJ_m3", "stress_Pa", "load")
 """What an ensemble, or a stage of it, has in common."""
+SPHERES: Final = 2000
+"""Of the packing whose spread stands for all."""
 SAME: Final = {0.0: 0.003, 0.05: 0.003, 0.3: 0.005}
 """Differences in porosity up to which cells of one x are the same, by friction."""
 UNMOVED: Final = {0.0: 0.002, 0.05: 0.002, 0.3: 0.005}
@@ -91,21 +94,13 @@ def averages(cells: pd.DataFrame) -> pd.DataFrame:
                 **dict(zip(CELL_COLUMNS, key, strict=True)),
                 "n": values.size,
                 "rejected": len(group) - values.size,
-                "porosity": _mean(values),
+                "porosity": float(good["porosity"].mean()),
                 "sd": float(values.std(ddof=1)) if values.size > 1 else math.nan,
                 "se": standard_error(values),
                 **{name: good[name].mean() for name in ("coordination", "backbone", "rattlers", "steps", "seconds")},
             }
         )
     return pd.DataFrame(rows)
-
-
-def _of(cells: pd.DataFrame, case: str, load: float | None = None) -> FloatArray:
-    """Porosities of a case's accepted packings, at one load of several."""
-    rows = accepted(cells[cells["case"] == case])
-    if load is not None:
-        rows = rows[np.isclose(rows["load"], load, rtol=1e-6)]
-    return rows["porosity"].to_numpy(np.float64)
 
 
 def references(means: pd.DataFrame) -> pd.DataFrame:
@@ -174,23 +169,66 @@ def friction_series(means: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(solids=1.0 - rows["porosity"])
 
 
+@dataclass(frozen=True)
+class Ensemble:
+    """Mean of accepted packings.
+
+    Attributes
+    ----------
+    porosity : float
+        Mean.
+    n, rejected : int
+        Accepted and rejected packings.
+    weight : float
+        Packings of 2000 spheres whose mean would be as sharp.
+    """
+
+    porosity: float
+    n: int
+    rejected: int
+    weight: float
+
+
+def ensemble(cells: pd.DataFrame) -> Ensemble:
+    """Average rows of one ensemble."""
+    good = accepted(cells)
+    weight = float(good["spheres"].sum()) / SPHERES
+    return Ensemble(float(good["porosity"].mean()), len(good), len(cells) - len(good), weight)
+
+
+def spread(cells: pd.DataFrame) -> Spread:
+    """Pool the standard deviation of one packing of 2000 spheres over ensembles, and stages of those that are led.
+
+    The variance of one packing goes as one over its spheres.
+    """
+    good = accepted(cells).drop_duplicates(["seed", "spheres", "friction", "stress_Pa", "porosity"])
+    scaled = good["porosity"] * np.sqrt(good["spheres"] / SPHERES)
+    groups = scaled.groupby([good["case"], good["load"].round(6)], dropna=False)
+    return pooled_spread([values.to_numpy(np.float64) for _, values in groups])
+
+
+def cell_spreads(cells: pd.DataFrame) -> dict[float, Spread]:
+    """Pool :func:`spread` of 50/50 PMMA by friction, over all loads and ways to make a cell."""
+    here = cells[cells["section"].isin([COLLAPSE, PATHS, INVARIANCE])]
+    return {friction: spread(here[here["friction"] == friction]) for friction in FRICTIONS}
+
+
 def collapse(cells: pd.DataFrame) -> pd.DataFrame:
     """Hold cohesions against each other at the same x: porosity of both, difference, its 95 % half-width, ``holds``."""
-    rows = []
+    rows, spreads = [], cell_spreads(cells)
     here = cells[cells["section"] == COLLAPSE]
     for friction, load in itertools.product(FRICTIONS, COLLAPSED):
         group = here[(here["friction"] == friction) & np.isclose(here["load"], load)]
-        weak, strong = (accepted(part)["porosity"].to_numpy() for _, part in group.groupby("cohesion_kJ_m3"))
-        found = _difference(weak, strong)
-        limit = SAME[friction]
+        weak, strong = (ensemble(part) for _, part in group.groupby("cohesion_kJ_m3"))
+        found, limit = _change(weak, strong, spreads[friction]), SAME[friction]
         rows.append(
             {
                 "friction": friction,
                 "load": load,
-                "n": min(weak.size, strong.size),
-                "rejected": len(group) - weak.size - strong.size,
-                "weak": _mean(weak),
-                "strong": _mean(strong),
+                "n": min(weak.n, strong.n),
+                "rejected": weak.rejected + strong.rejected,
+                "weak": weak.porosity,
+                "strong": strong.porosity,
                 **found,
                 "limit": limit,
                 "holds": abs(found["change"]) <= limit,
@@ -205,28 +243,26 @@ def paths(cells: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        By friction and load: mean and standard error of each way, ``apart`` (the two led ways, the second minus the
-        first), ``ahead`` (at once minus the mean of both; nan at the first load, which both ways start from), 95 %
-        half-widths, and whether each holds.
+        By friction and load: mean and number of each way, ``apart`` (the two led ways, the second minus the first),
+        ``ahead`` (at once minus the mean of both; nan at the first load, which both ways start from), 95 % half-widths,
+        and whether each holds.
     """
+    rows, spreads = [], cell_spreads(cells)
     here = cells[cells["section"] == PATHS]
-    rows = []
-    for friction in FRICTIONS:
-        for load in COMPARED:
-            raised = _of(here, f"stress_{friction:g}", load)
-            weakened = _of(here, f"cohesion_{friction:g}", load)
-            direct = _of(here, f"direct_{friction:g}_x{load:g}")
-            led, at_once = _difference(raised, weakened), _difference(np.concatenate([raised, weakened]), direct)
-            row: dict[str, Any] = {"friction": friction, "load": load, "limit": SAME[friction]}
-            for name, values in (("raised", raised), ("weakened", weakened), ("direct", direct)):
-                row |= {f"n_{name}": values.size, name: _mean(values), f"se_{name}": standard_error(values)}
-            row |= {
-                "apart": led["change"],
-                "apart_ci95": led["ci95"],
-                "apart_holds": abs(led["change"]) <= row["limit"],
-            }
-            row |= {"ahead": at_once["change"], "ahead_ci95": at_once["ci95"]}
-            rows.append(row | {"ahead_holds": not abs(at_once["change"]) > row["limit"]})
+    for friction, load in itertools.product(FRICTIONS, COMPARED):
+        group = here[(here["friction"] == friction) & np.isclose(here["load"], load)]
+        raised, weakened, direct, led = (
+            ensemble(group[group["case"].str.startswith(way)])
+            for way in ("stress_", "cohesion_", "direct_", ("stress_", "cohesion_"))
+        )
+        apart, ahead = _change(raised, weakened, spreads[friction]), _change(led, direct, spreads[friction])
+        limit = SAME[friction]
+        row: dict[str, Any] = {"friction": friction, "load": load, "limit": limit}
+        for name, each in (("raised", raised), ("weakened", weakened), ("direct", direct)):
+            row |= {f"n_{name}": each.n, f"rejected_{name}": each.rejected, name: each.porosity}
+        row |= {"apart": apart["change"], "apart_ci95": apart["ci95"], "apart_holds": abs(apart["change"]) <= limit}
+        row |= {"ahead": ahead["change"], "ahead_ci95": ahead["ci95"], "ahead_holds": not abs(ahead["change"]) > limit}
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -236,59 +272,62 @@ def changes(cells: pd.DataFrame, section: str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        By friction: label, n, rejected, porosity, sd, se, change, ci95 (Welch), limit, holds; the usual one first.
+        By friction: label, n, rejected, porosity, se, change, its 95 % half-width, limit, holds; the usual one first.
+        Errors follow from the spread of one packing, pooled over all ways of the friction.
     """
     rows = []
     here = cells[cells["section"] == section]
     for friction in sorted(here["friction"].unique()):
         group = here[here["friction"] == friction]
-        usual: FloatArray | None = None
+        one = cell_spreads(cells)[friction] if section == INVARIANCE else spread(group)
+        usual: Ensemble | None = None
         for label, part in group.groupby("label", sort=False):
-            values = accepted(part)["porosity"].to_numpy(np.float64)
-            usual = values if usual is None else usual
-            found = _difference(usual, values)
+            mine = ensemble(part)
+            found = {"change": 0.0, "ci95": math.nan} if usual is None else _change(usual, mine, one)
+            usual = usual or mine
             limit = UNMOVED[friction]
-            rows.append(
-                {
-                    "friction": friction,
-                    "label": label,
-                    "n": values.size,
-                    "rejected": len(part) - values.size,
-                    "porosity": _mean(values),
-                    "sd": values.std(ddof=1) if values.size > 1 else math.nan,
-                    "se": standard_error(values),
-                    **found,
-                    "limit": limit,
-                    "holds": abs(found["change"]) <= limit,
-                    "steps": accepted(part)["steps"].mean(),
-                }
-            )
+            row = {
+                "friction": friction,
+                "label": label,
+                "n": mine.n,
+                "rejected": mine.rejected,
+                "porosity": mine.porosity,
+            }
+            row |= {"se": one.sd / math.sqrt(mine.weight) if mine.n else math.nan, **found, "limit": limit}
+            rows.append(row | {"holds": abs(found["change"]) <= limit})
     return pd.DataFrame(rows)
 
 
-def cost(means: pd.DataFrame) -> pd.DataFrame:
+def cost(cells: pd.DataFrame) -> pd.DataFrame:
     """Work out what a 95 % half-width of ``HALF_WIDTH`` costs by each way to pack.
 
     Returns
     -------
     DataFrame
         The averages, ``material``, ``settled`` (whether by gravity), ``seconds_for`` (time times variance, over the
-        variance that is allowed), and of cells ``gain``: how many times cheaper than the material's cheapest settled
-        bed, with the factor ``gain_factor`` of its 95 % interval.
+        variance that is allowed; the variance of one packing is pooled over sizes of the box, see :func:`spread`), and
+        of cells ``gain``: how many times cheaper than the material's cheapest settled bed, with the factor
+        ``gain_factor`` of its 95 % interval.
     """
-    rows = means[means["section"] == COST].copy()
+    timed = cells[cells["section"] == COST]
+    rows = averages(timed)
     rows["material"] = rows["case"].str.split("_").str[0]
     rows["settled"] = rows["case"].str.contains("gravity")
-    rows["seconds_for"] = rows["seconds"] * (quantile() * rows["sd"] / HALF_WIDTH) ** 2
+    spreads = {
+        key: spread(timed[timed["case"].isin(group["case"])]) for key, group in rows.groupby(["material", "settled"])
+    }
+    mine = [spreads[key] for key in zip(rows["material"], rows["settled"], strict=True)]
+    variance = np.array([one.sd**2 for one in mine]) * SPHERES / rows["spheres"].to_numpy(np.float64)
+    rows["freedom"] = [one.freedom for one in mine]
+    rows["seconds_for"] = rows["seconds"] * variance * (quantile() / HALF_WIDTH) ** 2
     rows["gain"], rows["gain_factor"] = math.nan, math.nan
     for material in rows["material"].unique().tolist():
-        beds = rows[(rows["material"] == material) & rows["settled"]]
-        best = beds.sort_values("seconds_for").iloc[0]
-        cells = rows.index[(rows["material"] == material) & ~rows["settled"]]
-        rows.loc[cells, "gain"] = best["seconds_for"] / rows.loc[cells, "seconds_for"]
+        best = rows[(rows["material"] == material) & rows["settled"]].sort_values("seconds_for").iloc[0]
+        others = rows.index[(rows["material"] == material) & ~rows["settled"]]
+        rows.loc[others, "gain"] = best["seconds_for"] / rows.loc[others, "seconds_for"]
         # of the ratio of two estimated variances
-        doubt = 2.0 / (best["n"] - 1.0) + 2.0 / (rows.loc[cells, "n"] - 1.0)
-        rows.loc[cells, "gain_factor"] = np.exp(quantile() * np.sqrt(doubt))
+        doubt = 2.0 / best["freedom"] + 2.0 / rows.loc[others, "freedom"]
+        rows.loc[others, "gain_factor"] = np.exp(quantile() * np.sqrt(doubt))
     return rows
 
 
@@ -301,42 +340,25 @@ def gains(costs: pd.DataFrame) -> pd.DataFrame:
 
 
 def mass_scaling(cells: pd.DataFrame) -> pd.DataFrame:
-    """Hold scaled against unscaled masses: porosities, change, 95 % half-width, steps and seconds saved (ratios)."""
+    """Hold scaled against unscaled masses: porosities, change, 95 % half-width, steps and seconds."""
     rows = []
     for label, group in cells[cells["section"] == SCALING].groupby("label", sort=False):
         scaled = group["case"].str.endswith("_scaled")
-        parts = {"scaled": accepted(group[scaled]), "plain": accepted(group[~scaled])}
-        values = {name: part["porosity"].to_numpy(np.float64) for name, part in parts.items()}
-        found = _difference(values["plain"], values["scaled"])
-        row = {
-            "label": label,
-            "spheres": int(group["spheres"].iloc[0]),
-            **{f"n_{name}": part.size for name, part in values.items()},
-            **{
-                f"rejected_{name}": len(group[scaled == (name == "scaled")]) - part.size
-                for name, part in values.items()
-            },
-            **{name: _mean(part) for name, part in values.items()},
-            **found,
-            **{f"steps_{name}": part["steps"].mean() for name, part in parts.items()},
-            **{f"seconds_{name}": part["seconds"].mean() for name, part in parts.items()},
-        }
-        rows.append(row)
+        row: dict[str, Any] = {"label": label, "spheres": int(group["spheres"].iloc[0])}
+        for name, part in (("plain", group[~scaled]), ("scaled", group[scaled])):
+            mine, good = ensemble(part), accepted(part)
+            row |= {name: mine.porosity, f"n_{name}": mine.n, f"rejected_{name}": mine.rejected}
+            row |= {f"{what}_{name}": good[what].mean() for what in ("steps", "seconds")}
+        rows.append(row | _change(ensemble(group[~scaled]), ensemble(group[scaled]), spread(group)))
     return pd.DataFrame(rows)
 
 
-def _mean(values: FloatArray) -> float:
-    return float(values.mean()) if values.size else math.nan
-
-
-def _difference(usual: FloatArray, other: FloatArray) -> dict[str, float]:
-    if not (usual.size and other.size):
+def _change(usual: Ensemble, other: Ensemble, one: Spread) -> dict[str, float]:
+    """Difference of two means and the half-width of its 95 % interval, from the spread of one packing of 2000."""
+    if not (usual.n and other.n):
         return {"change": math.nan, "ci95": math.nan}
-    same = usual is other
-    return {
-        "change": float(other.mean() - usual.mean()),
-        "ci95": math.nan if same else difference_half_width(usual, other),
-    }
+    error = one.sd * math.sqrt(1.0 / usual.weight + 1.0 / other.weight)
+    return {"change": other.porosity - usual.porosity, "ci95": quantile(one.freedom) * error}
 
 
 def fitted(load: FloatArray, friction: float) -> FloatArray:
@@ -362,7 +384,7 @@ def unmet(cells: pd.DataFrame) -> tuple[list[str], int]:
         *_said_of_friction(means),
         *_said_of_loads(cells),
         *_said_of_changes(changes(cells, INVARIANCE)),
-        *_said_of_cost(means),
+        *_said_of_cost(cells),
     ]
     return [text for holds, text in said if not holds], len(said)
 
@@ -418,8 +440,8 @@ def _said_of_changes(table: pd.DataFrame) -> _Said:
     return said
 
 
-def _said_of_cost(means: pd.DataFrame) -> _Said:
-    costs = cost(means)
+def _said_of_cost(cells: pd.DataFrame) -> _Said:
+    costs = cost(cells)
     spread = float(costs.loc[costs["case"] == "pmma_cell_2000", "sd"].iloc[0])
     said = [(spread <= NARROW, f"standard deviation of one cell of 2000: {spread:.4f}, at most {NARROW} expected")]
     for row in _rows(gains(costs)):

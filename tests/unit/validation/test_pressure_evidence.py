@@ -16,7 +16,6 @@ import pytest
 
 from filtercake.packing.cell import CellScene
 from filtercake.packing.scene import Scene
-from filtercake.statistics import difference_half_width
 from filtercake.validation import pressure
 from filtercake.validation import pressure_evidence as evidence
 from filtercake.validation.pressure import COLUMNS, COST, INVARIANCE, PATHS, SCALING, Case, cases, kept_as
@@ -57,7 +56,7 @@ def rows_of(case: str, porosity: Sequence[float], section: str = INVARIANCE, **o
 
 def test_the_cases_are_well_formed(listed: list[Case]) -> None:
     assert len({case.name for case in listed}) == len(listed)
-    assert all(case.cells >= 3 for case in listed)
+    assert all(case.cells >= 2 for case in listed)
     for case in listed:
         if isinstance(case.stages, Scene) or len(case.stages) == 1:
             continue
@@ -161,18 +160,32 @@ def test_changes_are_against_the_first_of_each_friction() -> None:
     found = evidence.changes(pd.DataFrame(rows), INVARIANCE)
     assert found["change"].tolist() == pytest.approx([0.0, 0.003, 0.0, 0.003])
     assert found["holds"].tolist() == [True, False, True, True]
-    assert found["ci95"][1] == pytest.approx(difference_half_width(usual, other))
+    # both spread by 0.001, with four degrees of freedom together
+    assert found["ci95"][1] == pytest.approx(2.776445 * 0.001 * math.sqrt(2.0 / 3.0), rel=1e-5)
+    assert found["se"][1] == pytest.approx(0.001 / math.sqrt(3.0))
     assert math.isnan(found["ci95"][0])
+
+
+def test_spread_is_that_of_2000_spheres_whatever_the_size() -> None:
+    rows = rows_of("a", [0.300, 0.304], spheres=500) + rows_of("b", [0.31, 0.311], spheres=8000)
+    one = evidence.spread(pd.DataFrame(rows))
+    assert one.freedom == 2.0
+    assert one.sd == pytest.approx(math.sqrt(0.5 * (8e-6 / 4.0 + 5e-7 * 4.0)))
+    assert evidence.ensemble(pd.DataFrame(rows)).weight == pytest.approx(2 * 0.25 + 2 * 4.0)
 
 
 def test_a_cost_is_time_times_variance() -> None:
     rows = rows_of("pmma_cell_2000", [0.310, 0.312], COST, seconds=4.0)
     rows += rows_of("pmma_gravity_2000", [0.350, 0.354], COST, seconds=3.0)
-    found = evidence.cost(evidence.averages(pd.DataFrame(rows))).set_index("case")
+    rows += rows_of("pmma_cell_4000", [0.310, 0.310 + 0.001 * math.sqrt(2.0)], COST, spheres=4000, seconds=9.0)
+    found = evidence.cost(pd.DataFrame(rows)).set_index("case")
     cell = found.loc["pmma_cell_2000"]
     assert cell["seconds_for"] == pytest.approx(4.0 * 1.959964**2 * 2e-6 / 0.002**2, rel=1e-6)
     assert cell["gain"] == pytest.approx(3.0 * 4.0 / 4.0)
     assert math.isnan(found.loc["pmma_gravity_2000", "gain"])
+    assert found.loc["pmma_cell_4000", "gain"] == pytest.approx(3.0 * 4.0 / 4.0 * 8.0 / 9.0)
+    assert cell["freedom"] == 2.0
+    assert cell["gain_factor"] == pytest.approx(math.exp(1.959964 * math.sqrt(2.0 / 1.0 + 2.0 / 2.0)))
     (best,) = evidence.gains(found.reset_index()).to_dict("records")
     assert best["wanted"] == 2.0 and best["holds"]
 
