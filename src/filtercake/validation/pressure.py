@@ -363,11 +363,12 @@ def _said(rows: list[dict[str, Any]]) -> str:
 def table(folder: Path, chosen: Iterable[Case]) -> pd.DataFrame:
     """Read what ``folder`` holds of the cases; one row, ``COLUMNS``, per stage of a member."""
     rows = []
-    for case, seed in [(case, seed) for case in chosen for seed in range(1, case.cells + 1)]:
-        path = kept_as(folder, case.member(seed))
-        if path.exists():
-            named = {"section": case.section, "case": case.name, "label": case.label, "seed": seed}
-            rows += [{**named, **row} for row in json.loads(path.read_text(encoding="utf-8"))["rows"]]
+    for case in chosen:
+        for seed in range(1, case.cells + 1):
+            path = kept_as(folder, case.member(seed))
+            if path.exists():
+                named = {"section": case.section, "case": case.name, "label": case.label, "seed": seed}
+                rows += [{**named, **row} for row in json.loads(path.read_text(encoding="utf-8"))["rows"]]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

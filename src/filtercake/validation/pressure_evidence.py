@@ -67,7 +67,7 @@ CLOSE: Final = 0.64
 
 def read_cells(path: Path) -> pd.DataFrame:
     """Read a table of :func:`filtercake.validation.pressure.compute`."""
-    cells = pd.read_csv(path)
+    cells = pd.read_csv(path, dtype={"reason": str})
     return cells.assign(reason=cells["reason"].fillna(""))
 
 
