@@ -213,6 +213,7 @@ def pressure(template: Path, cells: pd.DataFrame) -> str:
         half_width=pressure_evidence.HALF_WIDTH,
         modulus=MODULUS,
         spreads=pressure_evidence.cell_spreads(cells),
+        trial={row["case"]: row for row in _records(cells[cells["seed"] == 1])},
         isostatic=pressure_evidence.contacts_without_stress(means),
         one={row["case"]: row for row in _records(means[means["section"] != PATHS])},
         path_stress=PATH_STRESS,

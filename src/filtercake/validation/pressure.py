@@ -217,11 +217,11 @@ def _paths() -> list[Case]:
         rising = [cell(pmma(), cohesion=ALONG_COHESION, load=x, friction=friction) for x in LOADS]
         weakening = [_weak(x, friction) for x in LOADS]
         listed += [
-            Case(PATHS, f"stress_{friction:g}", "stress raised", tuple(rising), 2),
-            Case(PATHS, f"cohesion_{friction:g}", "cohesion weakened", tuple(weakening), 2),
+            Case(PATHS, f"stress_{friction:g}", "stress raised", tuple(rising), 1),
+            Case(PATHS, f"cohesion_{friction:g}", "cohesion weakened", tuple(weakening), 1),
         ]
         listed += [
-            Case(PATHS, f"direct_{friction:g}_x{x:g}", "at once", (_weak(x, friction),), 2) for x in COMPARED[1:]
+            Case(PATHS, f"direct_{friction:g}_x{x:g}", "at once", (_weak(x, friction),), 1) for x in COMPARED[1:]
         ]
     return listed
 
@@ -260,7 +260,7 @@ def _invariance(friction: float) -> list[Case]:
 
 def _members(cells: int, spheres: int) -> int:
     """Cells for the same standard error: the variance of one goes as one over its spheres."""
-    return max(math.ceil(cells * 2000 / spheres), 2)
+    return max(math.ceil(cells * 2000 / spheres), 1)
 
 
 def _gravity(friction: float) -> list[Case]:
@@ -320,7 +320,7 @@ def _scaling() -> list[Case]:
     wide = {
         "alum": (alum(), ALUM_SPHERES, 2),
         "1:5 50/50": (mixture({20.0: 0.5, 100.0: 0.5}), 4000, 2),
-        "1:10 25/75": (mixture({10.0: 0.25, 100.0: 0.75}), 6000, 2),
+        "1:10 25/75": (mixture({10.0: 0.25, 100.0: 0.75}), 6000, 1),
     }
     return [
         Case(

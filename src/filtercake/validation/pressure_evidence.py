@@ -368,8 +368,8 @@ def fitted(load: FloatArray, friction: float) -> FloatArray:
 
 
 def rejections(cells: pd.DataFrame) -> list[dict[str, Any]]:
-    """List every rejected packing: section, label, friction, seed, spheres, reason."""
-    columns = ["section", "label", "friction", "seed", "spheres", "reason"]
+    """List every rejected packing: section, case, label, friction, seed, spheres, porosity, steps, reason."""
+    columns = ["section", "case", "label", "friction", "seed", "spheres", "porosity", "steps", "reason"]
     return [
         {str(key): value for key, value in row.items()}
         for row in cells.loc[cells["reason"] != "", columns].to_dict("records")

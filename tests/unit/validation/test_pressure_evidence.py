@@ -56,7 +56,7 @@ def rows_of(case: str, porosity: Sequence[float], section: str = INVARIANCE, **o
 
 def test_the_cases_are_well_formed(listed: list[Case]) -> None:
     assert len({case.name for case in listed}) == len(listed)
-    assert all(case.cells >= 2 for case in listed)
+    assert all(case.cells >= 1 for case in listed)
     for case in listed:
         if isinstance(case.stages, Scene) or len(case.stages) == 1:
             continue
