@@ -216,12 +216,13 @@ def _paths() -> list[Case]:
     for friction in FRICTIONS:
         rising = [cell(pmma(), cohesion=ALONG_COHESION, load=x, friction=friction) for x in LOADS]
         weakening = [_weak(x, friction) for x in LOADS]
+        cells = 1 if friction else 3
         listed += [
-            Case(PATHS, f"stress_{friction:g}", "stress raised", tuple(rising), 1),
-            Case(PATHS, f"cohesion_{friction:g}", "cohesion weakened", tuple(weakening), 1),
+            Case(PATHS, f"stress_{friction:g}", "stress raised", tuple(rising), cells),
+            Case(PATHS, f"cohesion_{friction:g}", "cohesion weakened", tuple(weakening), cells),
         ]
         listed += [
-            Case(PATHS, f"direct_{friction:g}_x{x:g}", "at once", (_weak(x, friction),), 1) for x in COMPARED[1:]
+            Case(PATHS, f"direct_{friction:g}_x{x:g}", "at once", (_weak(x, friction),), cells) for x in COMPARED[1:]
         ]
     return listed
 

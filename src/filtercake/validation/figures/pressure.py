@@ -66,7 +66,9 @@ def draw_friction(series: pd.DataFrame) -> Figure:
         label="cells of 2000",
         zorder=3,
     )
-    solids.plot([0.0], [CLOSE], "D", color=style.INK, markerfacecolor="white", label="published, friction 0", zorder=4)
+    solids.plot(
+        [0.0], [CLOSE], "D", color=style.INK, markerfacecolor="white", label="published, friction 0 and 1", zorder=4
+    )
     style.published_range(solids, 1.0, *LOOSE, colour=style.INK)
     solids.set_ylabel("Solids fraction (–)")
     contacts.plot(series["friction"], series["coordination"], "-o", color=style.colour(1), label="all spheres")
