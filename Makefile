@@ -126,7 +126,7 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 permeability: setup ## Stokes flow through packings, the evidence on the resistance law: docs/permeability.md (about 40 min on one core; goes on where it was stopped)
 	$(PERMEABILITY)
 
-pressure: setup ## ensembles of pressure cells, the evidence on them: docs/pressure.md (about 45 min on 2 cores; goes on where it was stopped)
+pressure: setup ## ensembles of pressure cells, the evidence on them: docs/pressure.md (about 20 min on 2 cores; goes on where it was stopped)
 	$(PRESSURE) --processes $(CORES)
 
 flow-speed: setup ## time the solver of the flow against copying memory: docs/data/permeability_speed.csv (about 3 min, alone on the machine)

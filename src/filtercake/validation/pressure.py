@@ -216,7 +216,7 @@ def _paths() -> list[Case]:
     for friction in FRICTIONS:
         rising = [cell(pmma(), cohesion=ALONG_COHESION, load=x, friction=friction) for x in LOADS]
         weakening = [_weak(x, friction) for x in LOADS]
-        cells = 1 if friction else 3
+        cells = {0.0: 3, 0.05: 1, 0.3: 2}[friction]
         listed += [
             Case(PATHS, f"stress_{friction:g}", "stress raised", tuple(rising), cells),
             Case(PATHS, f"cohesion_{friction:g}", "cohesion weakened", tuple(weakening), cells),
