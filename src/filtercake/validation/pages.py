@@ -13,9 +13,10 @@ from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.permeability.measure import SPREAD
 from filtercake.study import limits
 from filtercake.user_files import templates
-from filtercake.validation import resistance_law
+from filtercake.validation import pressure_evidence, resistance_law
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
 from filtercake.validation.permeability import BED, CELL, LATTICE, LAYERED, known_constant
+from filtercake.validation.pressure import GRAVITY_BED, INVARIANCE, MODULUS, PATH_STRESS, PATHS
 from filtercake.validation.stability import OUTCOMES, UNDECIDED, families, undetected, wrong
 
 INTERIOR, COUNT = "interior slab", "count"
@@ -182,6 +183,40 @@ def permeability(template: Path, table: pd.DataFrame, second: pd.DataFrame) -> s
         total=len(table),
         seconds=float(table["seconds"].sum()),
         second=[] if second.empty else _records(resistance_law.both_methods(table, second)),
+    )
+
+
+def pressure(template: Path, cells: pd.DataFrame) -> str:
+    """Write the page on the pressure cell from its cells, one row for each that was brought to a stress.
+
+    See :func:`filtercake.validation.pressure.compute` and :func:`filtercake.validation.pressure_evidence.read_cells`.
+    """
+    means = pressure_evidence.averages(cells)
+    costs = pressure_evidence.cost(cells)
+    unmet, expected = pressure_evidence.unmet(cells)
+    return _render(
+        template,
+        total=len(cells.drop_duplicates(["case", "seed"])),
+        hours=float(cells["seconds"].sum()) / 3600.0,
+        rejections=pressure_evidence.rejections(cells),
+        unmet=unmet,
+        expected=expected,
+        references=_records(pressure_evidence.references(means)),
+        series=_records(pressure_evidence.friction_series(means)),
+        collapse=_records(pressure_evidence.collapse(cells)),
+        paths=_records(pressure_evidence.paths(cells)),
+        invariance=_records(pressure_evidence.changes(cells, INVARIANCE)),
+        gravity=_records(pressure_evidence.changes(cells, GRAVITY_BED)),
+        costs=_records(costs),
+        gains=_records(pressure_evidence.gains(costs)),
+        scaling=_records(pressure_evidence.mass_scaling(cells)),
+        half_width=pressure_evidence.HALF_WIDTH,
+        modulus=MODULUS,
+        spreads=pressure_evidence.cell_spreads(cells),
+        trial={row["case"]: row for row in _records(cells[cells["seed"] == 1])},
+        isostatic=pressure_evidence.contacts_without_stress(means),
+        one={row["case"]: row for row in _records(means[means["section"] != PATHS])},
+        path_stress=PATH_STRESS,
     )
 
 
