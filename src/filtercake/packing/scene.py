@@ -170,6 +170,7 @@ class Scene:
             pressure=1.0,
             crystal_modulus=1.0,
             bed_depth_factor=1.0,
+            initial_void_fraction=0.65,
             settling_velocity=0.0,
             skin=0.0,
         )

@@ -537,6 +537,18 @@ def test_a_cell_at_rest_that_is_no_packing_is_refused() -> None:
     assert found == "stress deviates by 0.66 of itself from an isotropic one: must be at most 0.6"
 
 
+def test_a_few_coarse_spheres_may_carry_the_stress_unevenly() -> None:
+    """1:10 by volume 25/75 with 6000 spheres has 18 coarse ones: their stress deviates by 0.23 of itself."""
+    radius = np.concatenate([np.full(18, 50.0 * UM), np.full(5982, 5.0 * UM)])
+    scene = replace(scene_of(particles=100), radius=radius)
+    uneven = CALM.stress.copy()
+    uneven[0, 1] = 0.23 * 88.0
+    inside = np.full((6000, 3), 0.5)
+    assert refusals(scene, replace(CALM, stress=uneven), inside, 1.0) == []
+    uneven[0, 1] = 0.5 * 88.0
+    assert refusals(scene, replace(CALM, stress=uneven), inside, 1.0)
+
+
 def test_a_real_crystal_is_scaled() -> None:
     strength = strength_of_adhesion(10e-3, 28.6 * UM)
     found = similar(53e3, 3e9, strength=strength)
