@@ -356,7 +356,7 @@ class Solved:
 
 def _solved_bed(case: Case, replicate: int, folder: Path) -> Solved:
     density = {} if "kinetics" in case.distribution else {"density_kg_m3": DENSITY}
-    engine = {"engine": Embedded.name, "processes": 1, "replicates": 1, "seed": 1 + replicate}
+    engine = {"protocol": "gravity", "engine": Embedded.name, "processes": 1, "replicates": 1, "seed": 1 + replicate}
     options = {"youngs_modulus_MPa": 5, **density, **case.options, **engine}
     source = distribution(**case.distribution)
     bed = pack(source, folder / "packings" / f"{case.name}_{replicate}", replace=True, **options)

@@ -80,6 +80,7 @@ MATERIAL: Final[dict[str, Any]] = {
     "restitution": 0.3,
 }
 PACKING: Final[dict[str, Any]] = {
+    "protocol": "gravity",
     "engine": "embedded",
     "friction": 0,
     "initial_void_fraction": 0.65,

@@ -108,7 +108,9 @@ def test_an_engine_with_a_box_of_its_own_takes_no_other(
 
 def test_it_packs_and_is_shown_by_its_name(tmp_path: Path) -> None:
     source = api.distribution(mixture={30: 0.5, 50: 0.5})
-    bed = api.pack(source, tmp_path / "bed", density_kg_m3=1180, particles=200, replicates=1, engine="toy")
+    bed = api.pack(
+        source, tmp_path / "bed", density_kg_m3=1180, particles=200, replicates=1, engine="toy", protocol="gravity"
+    )
     assert (bed.failures, bed.summary["engine"]) == ((), "toy")
     assert api.porosity(bed.files[0]).engine == "toy"
     figure = Figure()
