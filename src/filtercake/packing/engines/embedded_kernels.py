@@ -179,7 +179,8 @@ class Law(NamedTuple):
     """What of the equations of motion is the same for all spheres and steps; SI.
 
     ``shear_stiffness`` and ``shear_damping`` are the tangential constants over the normal ones, ``length`` is the
-    side of the periodic box.
+    side of the periodic box. Coulomb's limit holds for the tangential spring, as in LIGGGHTS, and where ``capped`` for
+    the whole tangential force, as in nature.
     """
 
     gravity: float
@@ -189,6 +190,7 @@ class Law(NamedTuple):
     shear_damping: float
     length: float
     time_step: float
+    capped: bool = False
 
 
 # columns of the state
@@ -470,7 +472,7 @@ def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
 def _limit_spring(
     hx: float, hy: float, hz: float, stiffness: float, allowed: float
 ) -> tuple[float, float, float, bool]:
-    """Shorten a tangential spring to the Coulomb limit; say whether the contact slides."""
+    """Shorten a tangential spring (a force: of stiffness 1) to the Coulomb limit; say whether the contact slides."""
     stretched = stiffness * math.sqrt(hx * hx + hy * hy + hz * hz)
     if stretched <= allowed:
         return hx, hy, hz, False
@@ -565,11 +567,14 @@ def pair_forces(
                 hz = spring[pair[q], 2] + sz * spring_step
                 along = hx * nx + hy * ny + hz * nz
                 stiffness = law.shear_stiffness * constants[q, STIFFNESS] * root
+                allowed = law.friction * abs(normal)
                 hx, hy, hz, slides = _limit_spring(
-                    hx - along * nx, hy - along * ny, hz - along * nz, stiffness, law.friction * abs(normal)
+                    hx - along * nx, hy - along * ny, hz - along * nz, stiffness, allowed
                 )
                 drag = 0.0 if slides else law.shear_damping * constants[q, DAMPING] * quarter
                 px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
+                if law.capped:
+                    px, py, pz, _ = _limit_spring(px, py, pz, 1.0, allowed)
                 spring[pair[q], 0], spring[pair[q], 1], spring[pair[q], 2] = hx, hy, hz
                 gx += px
                 gy += py
@@ -629,6 +634,8 @@ def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, co
             )
             drag = 0.0 if slides else law.shear_damping * constants[i, DAMPING] * quarter
             px, py = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy
+            if law.capped:
+                px, py, _, _ = _limit_spring(px, py, 0.0, 1.0, law.friction * abs(normal))
             spring[i, 0], spring[i, 1] = hx, hy
             force[i, 0] += px
             force[i, 1] += py
