@@ -1,4 +1,4 @@
-"""The embedded engine against LAMMPS: oblique impacts of two spheres, and beds from the same clouds.
+"""The embedded engine against LAMMPS: oblique impacts of two spheres, and beds and cells from the same clouds.
 
 ``python -m filtercake.validation.lammps_agreement --folder docs/data`` writes ``lammps_impacts.csv`` and ``lammps.csv``
 (one row per packing; goes on where it was stopped) and prints what follows from them. ``FILTERCAKE_LAMMPS`` names the
@@ -19,7 +19,10 @@ import numpy as np
 import pandas as pd
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
-from filtercake.packing.cloud import Cloud, make_cloud
+from filtercake.packing import contact_law
+from filtercake.packing.cell import CHECK_STEPS, CellScene, unrest
+from filtercake.packing.cell_box import CellBox
+from filtercake.packing.cloud import Cloud, make_cloud, place_spheres
 from filtercake.packing.engines.embedded_bed import Bed
 from filtercake.packing.porosity import slab_porosity
 from filtercake.packing.scene import Scene
@@ -30,7 +33,7 @@ from filtercake.study.limits import default_time_step
 from filtercake.units import MICROMETRE, FloatArray
 from filtercake.validation.lammps_bed import Contact, LammpsBed
 
-OURS, LAMMPS = "embedded", "lammps"
+OURS, LAMMPS, CELL = "embedded", "lammps", "pressure cell"
 SPRING, FORCE, UNDAMPED, DAMPED, SYNCHRONIZED = "spring limited", "force limited", "undamped", "damped", "synchronized"
 """Tangential force: our Coulomb limit of the spring alone and of the whole force, no damper, LAMMPS's two."""
 VARIANTS: Final = (
@@ -39,15 +42,15 @@ VARIANTS: Final = (
     (OURS, FORCE),
     (OURS, UNDAMPED),
     (LAMMPS, UNDAMPED),
-    (LAMMPS, SYNCHRONIZED),
 )
+CELLS: Final = ((CELL, SPRING), (CELL, FORCE))
 COMPARED: Final = (
     ((OURS, SPRING), (LAMMPS, DAMPED)),
     ((OURS, UNDAMPED), (LAMMPS, UNDAMPED)),
     ((OURS, FORCE), (LAMMPS, DAMPED)),
     ((OURS, FORCE), (OURS, SPRING)),
     ((LAMMPS, UNDAMPED), (LAMMPS, DAMPED)),
-    ((LAMMPS, SYNCHRONIZED), (LAMMPS, DAMPED)),
+    ((CELL, FORCE), (CELL, SPRING)),
 )
 POROSITIES: Final = ("porosity", "porosity_whole_bed")
 
@@ -75,7 +78,7 @@ class Case:
 
     def variants(self) -> tuple[tuple[str, str], ...]:
         """Engines and tangential forces that are compared: without friction there is none."""
-        return VARIANTS if self.friction > 0.0 else ((OURS, UNDAMPED), (LAMMPS, UNDAMPED))
+        return (*VARIANTS, *CELLS) if self.friction > 0.0 else ((OURS, UNDAMPED), (LAMMPS, UNDAMPED))
 
 
 CASES: Final = (
@@ -85,6 +88,11 @@ CASES: Final = (
 )
 FIRST_SEED: Final = 201
 ANGLES_DEG: Final = (5.0, 15.0, 30.0, 45.0, 60.0, 80.0)
+CELL_PARTICLES: Final = 1000
+CELL_STRESS: Final = 88.0
+"""Stress of the cells, Pa."""
+CELL_LOAD: Final = 16.0
+"""Their stress over what their cohesion holds."""
 IMPACT_SPEED: Final = 0.01
 """Normal relative speed of two spheres that collide, m/s."""
 IMPACT_RADIUS_UM: Final = 10.0
@@ -193,11 +201,46 @@ def settle(bed: AnyBed, cloud: Cloud, scene: Scene) -> tuple[int, bool]:
 
 
 def pack(case: Case, seed: int, engine: str, variant: str) -> dict[str, Any]:
-    """Settle one cloud in one engine: a row of ``lammps.csv``."""
+    """Make one packing: a row of ``lammps.csv``."""
+    started = time.monotonic()
+    make = press if engine == CELL else deposit
+    row = {"size_ratio": case.ratio, "friction": case.friction, "seed": seed, "engine": engine, "tangential": variant}
+    return {**row, **make(case, seed, engine, variant), "wall_s": round(time.monotonic() - started, 1)}
+
+
+def press(case: Case, seed: int, _: str, variant: str) -> dict[str, Any]:
+    """Press one cloud in the pressure cell, with a little cohesion: part of a row; the whole bed is the cell."""
+    given = case.scene
+    material = given.youngs_modulus, given.poisson_ratio
+    scene = CellScene.from_csd(
+        given.csd,
+        CELL_PARTICLES,
+        stress=CELL_STRESS,
+        density=given.density,
+        friction=given.friction,
+        cohesion=contact_law.cohesion_of_strength(CELL_STRESS / CELL_LOAD, *material),
+    )
+    side = math.cbrt(scene.solids / (1.0 - scene.void_fraction))
+    box = CellBox(scene, place_spheres(scene.radius, side, side, seed, periodic=True), side)
+    box.law = box.law._replace(capped=variant == FORCE)
+    looks = [box.look()]
+    while (found := unrest(scene, looks)) and box.step < scene.patience:
+        box.advance(CHECK_STEPS)
+        looks.append(box.look())
+    return {
+        "particles": CELL_PARTICLES,
+        "porosity": looks[-1].rigid_porosity,
+        "porosity_whole_bed": looks[-1].rigid_porosity,
+        "steps": box.step,
+        "settled": not found,
+    }
+
+
+def deposit(case: Case, seed: int, engine: str, variant: str) -> dict[str, Any]:
+    """Settle one cloud in one engine: part of a row."""
     scene = case.scene
     cloud = make_cloud(scene.csd, scene.particles, scene.initial_void_fraction, seed)
-    started = time.monotonic()
-    bed: Bed | LammpsBed
+    bed: AnyBed
     if engine == OURS:
         bed = vary(Bed.from_cloud(cloud, scene), variant)
     else:
@@ -208,17 +251,11 @@ def pack(case: Case, seed: int, engine: str, variant: str) -> dict[str, Any]:
     steps, settled = settle(bed, cloud, scene)
     position = bed.state()[0]
     return {
-        "size_ratio": case.ratio,
-        "friction": case.friction,
-        "seed": seed,
-        "engine": engine,
-        "tangential": variant,
         "particles": scene.particles,
         "porosity": slab_porosity(position, cloud.radius, cloud.length, interior_slab(position, cloud.radius)),
         "porosity_whole_bed": whole_bed(position, cloud),
         "steps": steps,
         "settled": settled,
-        "wall_s": round(time.monotonic() - started, 1),
     }
 
 
@@ -271,7 +308,7 @@ def impacts(angles_deg: Sequence[float] = ANGLES_DEG) -> pd.DataFrame:
             "angle_deg": angles_deg,
             **{
                 f"{engine} {variant}": [impact(engine, variant, angle) for angle in angles_deg]
-                for engine, variant in VARIANTS
+                for engine, variant in (*VARIANTS, (LAMMPS, SYNCHRONIZED))
             },
         }
     )
@@ -287,7 +324,6 @@ def make_packings(file: Path) -> pd.DataFrame:
         for case in CASES
         for engine, variant in (case.variants() if number < case.pairs else ())
     ]
-    asked.sort(key=lambda packing: packing[3] == SYNCHRONIZED)  # last: what matters least
     for case, seed, engine, variant in asked:
         if (case.ratio, case.friction, seed, engine, variant) not in known:
             row = pd.DataFrame([pack(case, seed, engine, variant)])

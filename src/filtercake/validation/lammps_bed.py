@@ -180,7 +180,3 @@ class LammpsBed:
         height = float(np.average(position[:, 2], weights=mass))
         energy = float(0.5 * np.sum(mass * np.sum(velocity**2, axis=1)))
         return self.step * self.scene.time_step, height, energy, np.nan
-
-    def close(self) -> None:
-        """End LAMMPS and free its memory."""
-        self.lammps.close()

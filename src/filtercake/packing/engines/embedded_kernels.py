@@ -472,12 +472,22 @@ def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
 def _limit_spring(
     hx: float, hy: float, hz: float, stiffness: float, allowed: float
 ) -> tuple[float, float, float, bool]:
-    """Shorten a tangential spring (a force: of stiffness 1) to the Coulomb limit; say whether the contact slides."""
+    """Shorten a tangential spring to the Coulomb limit; say whether the contact slides."""
     stretched = stiffness * math.sqrt(hx * hx + hy * hy + hz * hz)
     if stretched <= allowed:
         return hx, hy, hz, False
     ratio = allowed / stretched
     return hx * ratio, hy * ratio, hz * ratio, True
+
+
+@_compiled
+def _limit_force(px: float, py: float, pz: float, allowed: float) -> tuple[float, float, float]:
+    """Shorten a tangential force to the Coulomb limit; it seldom needs a root."""
+    square = px * px + py * py + pz * pz
+    if square <= allowed * allowed:
+        return px, py, pz
+    ratio = allowed / math.sqrt(square)
+    return px * ratio, py * ratio, pz * ratio
 
 
 @cached_njit
@@ -573,8 +583,8 @@ def pair_forces(
                 )
                 drag = 0.0 if slides else law.shear_damping * constants[q, DAMPING] * quarter
                 px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
-                if law.capped:
-                    px, py, pz, _ = _limit_spring(px, py, pz, 1.0, allowed)
+                if law.capped and not slides:
+                    px, py, pz = _limit_force(px, py, pz, allowed)
                 spring[pair[q], 0], spring[pair[q], 1], spring[pair[q], 2] = hx, hy, hz
                 gx += px
                 gy += py
@@ -625,17 +635,14 @@ def _floor_forces(floor: Floor, bodies: Bodies, law: Law, spring_step: float, co
             arm = z + 0.5 * overlap
             sx, sy = state[i, U] - arm * spin[i, 1], state[i, V] + arm * spin[i, 0]
             stiffness = law.shear_stiffness * constants[i, STIFFNESS] * root
+            allowed = law.friction * abs(normal)
             hx, hy, _, slides = _limit_spring(
-                spring[i, 0] + sx * spring_step,
-                spring[i, 1] + sy * spring_step,
-                0.0,
-                stiffness,
-                law.friction * abs(normal),
+                spring[i, 0] + sx * spring_step, spring[i, 1] + sy * spring_step, 0.0, stiffness, allowed
             )
             drag = 0.0 if slides else law.shear_damping * constants[i, DAMPING] * quarter
             px, py = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy
-            if law.capped:
-                px, py, _, _ = _limit_spring(px, py, 0.0, 1.0, law.friction * abs(normal))
+            if law.capped and not slides:
+                px, py, _ = _limit_force(px, py, 0.0, allowed)
             spring[i, 0], spring[i, 1] = hx, hy
             force[i, 0] += px
             force[i, 1] += py
