@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from filtercake.crystals.csd import mixture
 from filtercake.packing import contact_law
+from filtercake.packing.cell import CellScene
+from filtercake.packing.cell_box import CellBox
 from filtercake.packing.engines.embedded_bed import Bed
 from filtercake.packing.scene import Scene
 
@@ -110,3 +112,17 @@ def test_a_sphere_thrown_along_the_floor_slides_and_then_rolls(capped):
     bed.advance(10_000)
     assert bed.state()[1][0, 0] == pytest.approx(5.0 / 7.0 * speed, rel=0.005)
     assert bed.full_spin()[0, 1] * radius == pytest.approx(5.0 / 7.0 * speed, rel=0.005)
+
+
+def test_the_pressure_cell_limits_the_whole_force():
+    radius, side = np.full(2, 10e-6), 100e-6
+    scene = CellScene(radius, stress=88.0, density=DENSITY, friction=FRICTION, drag=0.0)
+    box = CellBox(scene, np.array([[4e-5, 5e-5, 5e-5], [4e-5 + 0.99 * 2e-5, 5e-5, 5e-5]]), side)
+    box.velocity[0] = [0.0, 0.3, 0.0]
+    before = box.velocity.copy()
+    box.advance(1)
+    gained = box.velocity - before
+    assert gained[0, 0] == pytest.approx(-gained[1, 0])
+    assert abs(gained[0, 0]) > 0.0
+    # at first touch there is no spring: all that rubs is the damper, here above its limit
+    assert abs(gained[0, 1]) == pytest.approx(FRICTION * abs(gained[0, 0]), rel=1e-6)
