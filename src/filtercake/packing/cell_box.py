@@ -240,7 +240,7 @@ def _law(scene: CellScene) -> kernels.Law:
         shear_damping=contact_law.shear_damping_ratio(*material),
         length=0.0,
         time_step=scene.time_step,
-        capped=True,
+        capped=True,  # nothing ties the cell to LIGGGHTS
     )
 
 
