@@ -11,6 +11,8 @@ import pytest
 from filtercake.packing.cloud import Cloud
 from filtercake.validation.lammps_agreement import (
     CASES,
+    CELL,
+    CELLS,
     FORCE,
     LAMMPS,
     OURS,
@@ -90,21 +92,22 @@ def test_the_whole_bed_is_as_high_as_twice_its_centre_of_mass() -> None:
 
 def test_a_case_lists_no_tangential_force_without_friction() -> None:
     rough, smooth = (next(case for case in CASES if (case.friction > 0.0) is kind) for kind in (True, False))
-    assert rough.variants() == VARIANTS
+    assert rough.variants() == (*VARIANTS, *CELLS)
     assert smooth.variants() == ((OURS, UNDAMPED), (LAMMPS, UNDAMPED))
 
 
 def test_a_table_that_is_complete_is_left_as_it_is(tmp_path, monkeypatch) -> None:
     case = CASES[0]
     small = type(case)(case.size_um, case.volume_fraction, 0.3, 60, 1)
-    monkeypatch.setattr("filtercake.validation.lammps_agreement.CASES", (small,))
-    monkeypatch.setattr("filtercake.validation.lammps_agreement.VARIANTS", ((OURS, SPRING), (OURS, FORCE)))
+    changed = {"CASES": (small,), "VARIANTS": ((OURS, SPRING), (OURS, FORCE)), "CELLS": ((CELL, FORCE),)}
+    for name, value in {**changed, "CELL_PARTICLES": 100}.items():
+        monkeypatch.setattr(f"filtercake.validation.lammps_agreement.{name}", value)
     file = tmp_path / "lammps.csv"
     made = make_packings(file)
-    assert made["tangential"].tolist() == [SPRING, FORCE]
+    assert made["tangential"].tolist() == [SPRING, FORCE, FORCE]
     assert made["settled"].all()
     assert made["porosity_whole_bed"].between(0.3, 0.7).all()
-    assert made["porosity_whole_bed"].nunique() == 2
+    assert made["porosity_whole_bed"].nunique() == 3
     before = file.read_bytes()
     make_packings(file)
     assert file.read_bytes() == before
