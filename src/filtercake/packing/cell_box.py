@@ -298,6 +298,7 @@ def _law(scene: CellScene) -> kernels.Law:
         length=0.0,
         time_step=scene.time_step,
         adhesion=float(scene.adhesion),
+        capped=True,  # nothing ties the cell to LIGGGHTS
     )
 
 

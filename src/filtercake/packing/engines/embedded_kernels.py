@@ -180,6 +180,8 @@ class Law(NamedTuple):
 
     ``shear_stiffness`` and ``shear_damping`` are the tangential constants over the normal ones, ``length`` is the
     side of the periodic box. ``cohesion`` is SJKR's energy density, J/m3, ``adhesion`` the work of adhesion, J/m2.
+    Coulomb's limit holds for the tangential spring, as in LIGGGHTS, and where ``capped`` for the whole tangential
+    force, as in nature.
     """
 
     gravity: float
@@ -190,6 +192,7 @@ class Law(NamedTuple):
     length: float
     time_step: float
     adhesion: float = 0.0
+    capped: bool = False
 
 
 # kinds of attraction
@@ -482,6 +485,16 @@ def _limit_spring(
     return hx * ratio, hy * ratio, hz * ratio, True
 
 
+@_compiled
+def _limit_force(px: float, py: float, pz: float, allowed: float) -> tuple[float, float, float]:
+    """Shorten a tangential force to the Coulomb limit; it seldom needs a root."""
+    square = px * px + py * py + pz * pz
+    if square <= allowed * allowed:
+        return px, py, pz
+    ratio = allowed / math.sqrt(square)
+    return px * ratio, py * ratio, pz * ratio
+
+
 @cached_njit
 def _share(part: int, bodies: Bodies) -> range:
     """Return the spheres that one thread moves."""
@@ -571,11 +584,14 @@ def pair_forces(
                 hz = spring[pair[q], 2] + sz * spring_step
                 along = hx * nx + hy * ny + hz * nz
                 stiffness = law.shear_stiffness * constants[q, STIFFNESS] * root
+                allowed = law.friction * abs(normal)
                 hx, hy, hz, slides = _limit_spring(
-                    hx - along * nx, hy - along * ny, hz - along * nz, stiffness, law.friction * abs(normal)
+                    hx - along * nx, hy - along * ny, hz - along * nz, stiffness, allowed
                 )
                 drag = 0.0 if slides else law.shear_damping * constants[q, DAMPING] * quarter
                 px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
+                if law.capped and not slides:
+                    px, py, pz = _limit_force(px, py, pz, allowed)
                 spring[pair[q], 0], spring[pair[q], 1], spring[pair[q], 2] = hx, hy, hz
                 gx += px
                 gy += py
@@ -628,15 +644,14 @@ def _floor_forces(
             arm = z + 0.5 * overlap
             sx, sy = state[i, U] - arm * spin[i, 1], state[i, V] + arm * spin[i, 0]
             stiffness = law.shear_stiffness * constants[i, STIFFNESS] * root
+            allowed = law.friction * abs(normal)
             hx, hy, _, slides = _limit_spring(
-                spring[i, 0] + sx * spring_step,
-                spring[i, 1] + sy * spring_step,
-                0.0,
-                stiffness,
-                law.friction * abs(normal),
+                spring[i, 0] + sx * spring_step, spring[i, 1] + sy * spring_step, 0.0, stiffness, allowed
             )
             drag = 0.0 if slides else law.shear_damping * constants[i, DAMPING] * quarter
             px, py = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy
+            if law.capped and not slides:
+                px, py, _ = _limit_force(px, py, 0.0, allowed)
             spring[i, 0], spring[i, 1] = hx, hy
             force[i, 0] += px
             force[i, 1] += py
