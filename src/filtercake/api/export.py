@@ -24,7 +24,7 @@ from filtercake.run.provenance import ROOT, describe, packing_code
 from filtercake.study import engine_choice
 from filtercake.study.config.values import NAME
 from filtercake.study.loading import LoadedStudy, load_study
-from filtercake.study.points import Point, expand
+from filtercake.study.points import Point, expand, packed
 
 STUDIES = Path("config/studies")
 INPUT = "packing.json"
@@ -139,7 +139,9 @@ def _find(study: LoadedStudy, name: str) -> Point:
     if name not in points:
         allowed = f"no such point of the study {study.name} on this machine; points: {', '.join(points)}"
         raise ConfigError([Problem(ORIGIN, "point", repr(name), allowed)])
-    return points[name]
+    # a pressed point's packings are those of all its pressures
+    (found,) = packed([points[name]]).values()
+    return found
 
 
 def _outcomes(manifest: Path) -> dict[int, dict[str, Any]]:
@@ -190,6 +192,8 @@ def _write(
 
 def _write_input(folder: Path, scene: Scene, seed: int) -> str:
     """Write the cloud, and what the engine reads; say why not where that fails."""
+    if scene.is_pressed:
+        return ""  # the cell makes its own
     try:
         cloud = make_cloud(scene.csd, scene.particles, scene.initial_void_fraction, seed, scene.bed_depth_factor)
         with (folder / "cloud.npz").open("wb") as stream:
@@ -223,6 +227,7 @@ def _copy(made: Path, point: str, replicate: int, target: Path) -> None:
 
 def _readme(found: dict[str, Any], inputs: list[str], problem: str) -> str:
     outcome, by_hand = found["outcome"], ENGINES[found["scene"]["engine"]].by_hand
+    settles = "protocol" not in found["scene"]
     lines = [
         f"# {found['study']}: {found['point']}, replicate {found['replicate']}",
         "",
@@ -244,7 +249,7 @@ def _readme(found: dict[str, Any], inputs: list[str], problem: str) -> str:
         f"| `{INPUT}` | all that decides the packing (SI units): sizes, material, time step, seeds |",
         "| `versions.json` | versions and machine |",
         "| `study.yaml`, `distribution.csv` | the study; the size distribution, whole and as packed |",
-        "| `cloud.npz` | the spheres before settling: position, radius, box (m) |",
+        *(["| `cloud.npz` | the spheres before settling: position, radius, box (m) |"] if settles else []),
         *([f"| {', '.join(f'`{name}`' for name in inputs)} | what the engine reads |"] if inputs else []),
         "| `as_run/` | what the results hold: packing and record, log, and the engine's output where it failed |",
     ]

@@ -26,6 +26,7 @@ from filtercake.errors import ConfigError, Problem, shown
 from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.filtration.resistance import implied_porosity, law_of
 from filtercake.packing import contact_law
+from filtercake.packing.scene import GRAVITY_PROTOCOL
 from filtercake.statistics import quantile
 from filtercake.study.config.packing import EngineName
 from filtercake.study.config.study import MOST_DISTRIBUTIONS, Workflow
@@ -371,6 +372,12 @@ def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements
     if law_of(study.model.resistance_law).needs_kozeny_constant:
         allowed = (
             f"its resistance_law is {study.model.resistance_law}, which no calibration solves: use carman or additive"
+        )
+        yield Problem(str(path), "study", shown(model.study), allowed)
+    if study.model.packing.protocol != GRAVITY_PROTOCOL:
+        allowed = (
+            f"its packing.protocol is {study.model.packing.protocol}, whose packings no calibration fits yet: "
+            f"use {GRAVITY_PROTOCOL}"
         )
         yield Problem(str(path), "study", shown(model.study), allowed)
     if points > MOST_POINTS:

@@ -30,7 +30,7 @@ from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
 from filtercake.study.estimate import estimate
 from filtercake.study.loading import load_study
-from filtercake.study.points import expand
+from filtercake.study.points import expand, packed
 from filtercake.units import HOUR, MICROMETRE
 
 USER_ERROR = 2
@@ -683,7 +683,7 @@ def _run_estimate(options: argparse.Namespace) -> int:
     if not (asked.isascii() and asked.isdigit() and len(asked) < 10 and int(asked) > 0):
         raise words.UsageError(f"--cores = {asked}: must be a whole number, from 1")
     study = load_study(Path(options.study))
-    points = expand(study, engine_choice.choose)
+    points = packed(expand(study, engine_choice.choose)).values()
     found = estimate(points, on_cluster=options.cluster)
     wall = found.wall_seconds(int(asked))
     if options.json:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from filtercake import api
 from filtercake.errors import ConfigError
 from filtercake.study.loading import LoadedStudy
 from filtercake.study.points import POINT_COLUMNS, Point, base_point, base_rows, expand, packed, points_table
@@ -162,3 +165,16 @@ def test_the_finest_crystals_are_allowed_under_enough_pressure(study_from: Study
     (point,) = points(study_from(HEAD + "  - {csd: fine, pressure_kPa: 100}\n"))
     assert point.scene.strength == pytest.approx(3.0 * np.pi / 8.0 * 1e-2 / 1e-6)
     assert point.scene.load_over_strength == pytest.approx(8.49, abs=0.01)
+
+
+def test_an_export_is_that_of_the_shared_packings(study_from: StudyFrom, tmp_path: Path) -> None:
+    study = study_from(HEAD.replace("particles: 500", "particles: 150") + "  - {csd: a, pressure_kPa: [10, 50]}\n")
+    first, second = points(study)
+    found = [
+        api.export(str(study.path), point.name, tmp_path / "results", tmp_path / f"out{k}")
+        for k, point in enumerate((first, second))
+    ]
+    assert found[0].point == found[1].point == first.packings
+    assert "cloud.npz" not in (found[0].folder / "README.md").read_text(encoding="utf-8")
+    scenes = [json.loads((item.folder / "packing.json").read_text(encoding="utf-8"))["scene"] for item in found]
+    assert scenes[0] == scenes[1] and scenes[0]["protocol"] == "filtration"
