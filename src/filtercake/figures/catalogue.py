@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from filtercake.calibration.measurements import Measurements, compressibility_by_csd
-from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL
+from filtercake.packing.scene import GRAVITY_PROTOCOL
 from filtercake.study.config.study import Study
 from filtercake.study.points import Point
 
@@ -42,13 +42,20 @@ class FigureSpec:
 
 
 def _varies(name: str) -> Callable[[list[Point]], bool]:
+    def kind(point: Point) -> tuple[str, str]:
+        return point.csd, point.scene.protocol
+
     def applies(points: list[Point]) -> bool:
         return any(
-            len({getattr(point.scene, name) for point in points if point.csd == csd}) > 1
-            for csd in {point.csd for point in points}
+            len({getattr(point.scene, name) for point in points if kind(point) == one}) > 1
+            for one in {kind(point) for point in points}
         )
 
     return applies
+
+
+def _compresses(points: list[Point]) -> bool:
+    return any(point.scene.is_pressed and point.scene.attraction != "none" for point in points)
 
 
 def _truncates(study: Study) -> bool:
@@ -71,10 +78,6 @@ def _falls(study: Study) -> bool:
     return study.packing.protocol == GRAVITY_PROTOCOL
 
 
-def _pressed(study: Study) -> bool:
-    return FILTRATION_PROTOCOL in study.protocols
-
-
 def _filters(study: Study) -> bool:
     return study.filter is not None
 
@@ -92,7 +95,7 @@ FIGURES: dict[str, FigureSpec] = {
     "sensitivity_poisson_restitution": FigureSpec(
         "sensitivity", lambda points: _varies("poisson_ratio")(points) or _varies("restitution")(points)
     ),
-    "cake_compression": FigureSpec("compression", needs=_pressed),
+    "cake_compression": FigureSpec("compression", _compresses),
     "packing_cross_section": FigureSpec("cross_section"),
     "packing_flow": FigureSpec("flow", needs=_solves_flow),
     "packing_porosity_profile": FigureSpec("profile", needs=_falls),

@@ -78,6 +78,8 @@ def cake_average(load: float, porosity: PorosityOfLoad) -> CakeAverage:
         If the load is below 1 or no number.
     """
     loads, local = _cut(load, porosity)
+    if loads.size == 1:
+        return CakeAverage(float(local[0]), float(local[0]), 0.0)
     resistance = shape(local)
     average = float(loads[-1] / _integral(loads, 1.0 / resistance)[-1])
     return CakeAverage(_porosity_of(average), float(local[-1]), float(1.0 - average / resistance[-1]))

@@ -205,3 +205,12 @@ def test_a_study_that_cannot_be_used_is_named_with_the_file_that_names_it(tmp_pa
     with pytest.raises(ConfigError, match=r"mine.yaml: study = 'measured.yaml': this study cannot") as found:
         load(tmp_path, TINY.replace("../tiny.yaml", "measured.yaml"))
     assert any(problem.file.endswith("measured.yaml") for problem in found.value.problems)
+
+
+def test_a_study_of_pressed_cakes_is_refused(tmp_path: Path) -> None:
+    text = load(tmp_path).study.path.read_text().replace("file: tiny.csv", f"file: {CSV}")
+    assert "packing:\n" in text
+    text = text.replace("packing:\n", "packing:\n  protocol: filtration\n  pressure_kPa: 50\n")
+    (tmp_path / "pressed.yaml").write_text(text)
+    with pytest.raises(ConfigError, match=r"its packing.protocol is filtration, whose packings no calibration fits"):
+        load(tmp_path, TINY.replace("../tiny.yaml", str(tmp_path / "pressed.yaml")))
