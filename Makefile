@@ -129,6 +129,7 @@ permeability: setup ## Stokes flow through packings, the evidence on the resista
 
 pressure: setup ## ensembles of pressure cells, the evidence on them: docs/pressure.md (about 20 min on 2 cores; goes on where it was stopped)
 	$(PRESSURE) --processes $(CORES)
+	$(BIN)/python -m filtercake.validation.figures.protocols --output docs/images/protocols.png
 
 flow-speed: setup ## time the solver of the flow against copying memory: docs/data/permeability_speed.csv (about 3 min, alone on the machine)
 	$(BIN)/python -m filtercake.validation.flow_speed --output docs/data/permeability_speed.csv

@@ -39,9 +39,9 @@ def draw(data: StudyData) -> Figure:
         style.footer(figure, rows, note)
         return figure
     replicate, packing = found[0]
-    _spheres(figure, axes, packing)
+    draw_spheres(figure, axes, packing)
     if not packing.is_cell:
-        _levels(axes, packing)
+        draw_levels(axes, packing)
     style.legend(figure, [axes], columns=3)
     what = f"replicate {replicate} of {selection.label(data, str(point['csd']))}, plane y = L/2"
     style.footer(figure, rows, what, note)
@@ -73,7 +73,8 @@ def plane_circles(packing: Packing, y: float) -> tuple[FloatArray, FloatArray, F
     return found[:, :2], found[:, 2], found[:, 3]
 
 
-def _spheres(figure: Figure, axes: Axes, packing: Packing) -> None:
+def draw_spheres(figure: Figure, axes: Axes, packing: Packing) -> None:
+    """Draw the circles in which the plane y = L/2 cuts a packing."""
     centre, cut_radius, diameter = plane_circles(packing, 0.5 * packing.length)
     sizes = np.unique(2.0 * packing.radius / MICROMETRE)
     norm = Normalize(sizes[0], sizes[-1])
@@ -103,7 +104,8 @@ def _spheres(figure: Figure, axes: Axes, packing: Packing) -> None:
     axes.set_ylim(-0.02 * top, 1.02 * top)
 
 
-def _levels(axes: Axes, packing: Packing) -> None:
+def draw_levels(axes: Axes, packing: Packing) -> None:
+    """Draw a bed's floor, its height and the slab that is measured."""
     slab = interior_slab(packing.position, packing.radius)
     axes.axhline(0.0, color=style.INK, linewidth=1.6, label="floor", gid="floor")
     for limit in (slab.lower, slab.upper):
