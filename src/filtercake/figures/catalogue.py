@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from filtercake.calibration.measurements import Measurements, compressibility_by_csd
-from filtercake.packing.scene import GRAVITY_PROTOCOL
+from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL
 from filtercake.study.config.study import Study
 from filtercake.study.points import Point
 
@@ -58,6 +58,10 @@ def _compresses(points: list[Point]) -> bool:
     return any(point.scene.is_pressed and point.scene.attraction != "none" for point in points)
 
 
+def _pressed(study: Study) -> bool:
+    return FILTRATION_PROTOCOL in study.protocols
+
+
 def _truncates(study: Study) -> bool:
     return any(csd.truncation for csd in study.csds.values())
 
@@ -95,7 +99,7 @@ FIGURES: dict[str, FigureSpec] = {
     "sensitivity_poisson_restitution": FigureSpec(
         "sensitivity", lambda points: _varies("poisson_ratio")(points) or _varies("restitution")(points)
     ),
-    "cake_compression": FigureSpec("compression", _compresses),
+    "cake_compression": FigureSpec("compression", _compresses, needs=_pressed),
     "packing_cross_section": FigureSpec("cross_section"),
     "packing_flow": FigureSpec("flow", needs=_solves_flow),
     "packing_porosity_profile": FigureSpec("profile", needs=_falls),

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from filtercake.statistics import difference_half_width, half_width, standard_error
-from filtercake.study.config.sweep import SWEPT
+from filtercake.study.config.sweep import OF_BEDS
 
 LARGEST_STANDARD_ERROR = 0.001
 """Combined standard error of the porosity up to which a comparison says anything."""
@@ -35,7 +35,7 @@ def compare_engines(replicates: pd.DataFrame, reference: str, other: str) -> pd.
         ``sharp`` (the standard error is small enough to say anything) and ``agree`` (sharp, and the interval holds 0).
     """
     rows = []
-    for case, group in replicates.groupby(["csd", *SWEPT], sort=False):
+    for case, group in replicates.groupby(["csd", *OF_BEDS], sort=False):
         good = group[group["status"] == "ok"]
         ours, theirs = (good.loc[good["engine"] == engine, "porosity"] for engine in (other, reference))
         errors = standard_error(theirs), standard_error(ours)
@@ -44,7 +44,7 @@ def compare_engines(replicates: pd.DataFrame, reference: str, other: str) -> pd.
         sharp = error <= LARGEST_STANDARD_ERROR
         rows.append(
             {
-                **dict(zip(("csd", *SWEPT), case, strict=True)),
+                **dict(zip(("csd", *OF_BEDS), case, strict=True)),
                 "particles": int(good["particles"].max()) if len(good) else 0,
                 f"n_{reference}": len(theirs),
                 f"porosity_{reference}": theirs.mean(),
@@ -78,7 +78,7 @@ def compare_sizes(small: pd.DataFrame, large: pd.DataFrame) -> pd.DataFrame:
         half-width of the smaller beds' 95 % interval, the difference (large minus small), and whether it is
         ``within`` that interval.
     """
-    same = ["csd", *SWEPT]
+    same = ["csd", *OF_BEDS]
     rows = []
     for case, beds in large[large["status"] == "ok"].groupby(same, sort=False):
         here = (small[same] == list(case)).all(axis="columns") & (small["status"] == "ok")

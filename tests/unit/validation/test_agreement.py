@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 from filtercake.statistics import half_width
-from filtercake.study.config.sweep import SWEPT
+from filtercake.study.config.sweep import OF_BEDS
 from filtercake.validation.agreement import compare_engines, compare_sizes
 
-BASE = dict(zip(SWEPT, (50.0, 0.0, 0.2, 0.3, 5.0), strict=True))
+BASE = dict(zip(OF_BEDS, (50.0, 0.0, 0.2, 0.3, 5.0), strict=True))
 
 
 def beds(values: list[float], particles: int, csd: str = "alum", status: str = "ok", **changes: float) -> pd.DataFrame:

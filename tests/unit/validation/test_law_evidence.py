@@ -156,11 +156,11 @@ def test_everything_is_written(table: pd.DataFrame, tmp_path: Path) -> None:
     (tmp_path / "images").mkdir()
     second = "permeability_second_method.csv"
     other = pd.read_csv(DOCS / "data" / second)
-    other.assign(kozeny_constant=171.234).to_csv(tmp_path / "data" / second, index=False)
+    other.assign(kozeny_constant=999.234).to_csv(tmp_path / "data" / second, index=False)
     write(table, TEMPLATE, tmp_path, tmp_path / "figure.pdf")
     assert (tmp_path / "images" / "permeability.png").stat().st_size > 10_000
     page = (tmp_path / PAGE).read_text(encoding="utf-8")
-    assert page.count("| 171.2 +- ") == len(other) == 3
+    assert page.count("| 999.2 +- ") == len(other) == 3
 
 
 def test_both_methods_agree(table: pd.DataFrame) -> None:

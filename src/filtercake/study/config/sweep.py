@@ -23,9 +23,11 @@ from filtercake.study.config.values import (
     YoungsModulus,
 )
 
+OF_BEDS = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa")
+"""What beds that fell have of them."""
 OF_FILTRATION = ("adhesion_mJ_m2", "pressure_kPa")
 """What only pressed cakes have of them; nothing in the rows of others."""
-SWEPT = ("cohesion_kJ_m3", "friction", "poisson_ratio", "restitution", "youngs_modulus_MPa", *OF_FILTRATION)
+SWEPT = (*OF_BEDS, *OF_FILTRATION)
 """Properties a sweep may vary, besides the distribution and the protocol."""
 
 
