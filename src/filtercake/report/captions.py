@@ -17,11 +17,17 @@ from filtercake.figures.filtered import filtered
 from filtercake.figures.selection import StudyData
 from filtercake.figures.style import FOOTER
 from filtercake.packing.result import publish
+from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL, PROTOCOLS
 from filtercake.report.pages import engine_names, environment
 from filtercake.report.words import heading, number, with_interval
 from filtercake.results.resistance_columns import LAW_CI95
 from filtercake.study.config.sweep import SWEPT
 
+MADE = {
+    GRAVITY_PROTOCOL: "settle under gravity from a random cloud",
+    FILTRATION_PROTOCOL: "are pressed from a random cloud as in a filter",
+}
+"""How spheres are packed by each protocol."""
 SUFFIX, FRONT = ".html.j2", "front"
 
 
@@ -57,7 +63,9 @@ def footer_of(figure: Path) -> str:
 
 
 def packing_counts(packings: pd.DataFrame) -> dict[str, Any]:
-    """Count packings, accepted and failed, and name their engines."""
+    """Count packings, accepted and failed, and name their engines; those that several points share count once."""
+    if "packings" in packings:
+        packings = packings.drop_duplicates(["packings", "replicate"])
     good = int((packings["status"] == "ok").sum())
     return {"n": good, "n_failed": len(packings) - good, "engines": engine_names(packings["engine"])}
 
@@ -69,11 +77,11 @@ def study_values(data: StudyData) -> dict[str, Any]:
     -------
     dict
         ``kind``, ``name``, ``title``; ``law`` (of the resistance); ``counts`` (see :func:`packing_counts`);
-        ``particles`` (smallest and largest number of spheres in a packing); ``base`` (porosity and resistance at the
-        base material by distribution), ``points`` (their number) and ``swept`` (values by heading); ``lowest`` and
-        ``highest`` resistance of all; ``cohesion`` and ``sensitivity`` (ends of the series that vary a property);
-        ``products``, ``filter`` and ``kept`` (crystallizer, filter and truncation by distribution); ``compared``
-        (published porosities).
+        ``particles`` (smallest and largest number of spheres in a packing), ``made`` (how they are packed); ``base``
+        (porosity and resistance at the base material by distribution), ``points`` (their number) and ``swept`` (values
+        by heading); ``lowest`` and ``highest`` resistance of all; ``cohesion`` and ``sensitivity`` (ends of the series
+        that vary a property); ``products``, ``filter`` and ``kept`` (crystallizer, filter and truncation by
+        distribution); ``compared`` (published porosities).
     """
     summary = data.summary
     known = summary[summary["resistance_m_kg"].notna()].sort_values("resistance_m_kg")
@@ -85,6 +93,7 @@ def study_values(data: StudyData) -> dict[str, Any]:
         "law": selection.law_title(data.study.resistance_law),
         "counts": packing_counts(data.replicates),
         "particles": (int(spheres.min()), int(spheres.max())) if len(spheres) else None,
+        "made": " or ".join(MADE[name] for name in PROTOCOLS if name in set(summary["protocol"])),
         "base": [_point(data, row) for row in selection.base_points(data).to_dict("records")],
         "points": len(summary),
         "swept": _swept(summary),
@@ -119,6 +128,7 @@ def _point(data: StudyData, row: Mapping[Any, Any]) -> dict[str, Any]:
     return {
         "label": selection.label(data, str(row["csd"])),
         "cohesion": f"{row['cohesion_kJ_m3']:g}",
+        "where": _where(row),
         "friction": f"{row['friction']:g}",
         "porosity": with_interval(float(row["porosity"]), float(row["porosity_ci95"])),
         "resistance": with_interval(float(row["resistance_m_kg"]), float(row["resistance_ci95_m_kg"]), "m/kg"),
@@ -126,6 +136,16 @@ def _point(data: StudyData, row: Mapping[Any, Any]) -> dict[str, Any]:
         "n": int(row["n"]),
         "n_failed": int(row["n_failed"]),
     }
+
+
+def _where(row: Mapping[Any, Any]) -> str:
+    """Name the attraction, the friction and the pressure of a point."""
+    words = [f"cohesion {row['cohesion_kJ_m3']:g} kJ/m³", f"friction {row['friction']:g}"]
+    if row["protocol"] == FILTRATION_PROTOCOL:
+        if row["cohesion_kJ_m3"] == 0.0:
+            words[0] = f"adhesion {row['adhesion_mJ_m2']:g} mJ/m²"
+        words.append(f"{row['pressure_kPa']:g} kPa")
+    return ", ".join(words)
 
 
 def _swept(summary: pd.DataFrame) -> dict[str, str]:

@@ -102,6 +102,7 @@ def failed(packings: pd.DataFrame) -> Content:
 
 def origin(packings: pd.DataFrame, provenance: Mapping[str, Any]) -> Content:
     """Tabulate the origin of the results: engine, versions, machine, commit, and the seed of every packing."""
+    packings = packings.drop_duplicates(["packings", "replicate"]) if "packings" in packings else packings
     versions = pd.DataFrame(provenance["versions"].items(), columns=["package", "version"])
     machine = pd.DataFrame(provenance["machine"].items(), columns=["machine", "value"])
     lead = (

@@ -17,6 +17,7 @@ from filtercake.figures.selection import StudyData
 from filtercake.filtration.compressible import cake_average
 from filtercake.packing.compression import LOADS, CompressionCurve
 from filtercake.packing.result import Packing
+from filtercake.report import captions
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
 from filtercake.results.resistance_columns import resistance_columns
 from filtercake.study.config.study import Study
@@ -123,3 +124,11 @@ def test_nothing_accepted_is_said(data: StudyData, tmp_path: Path) -> None:
     empty = dataclasses.replace(data, replicates=failed, summary=summary, points=summary)
     figure = draw("cake_compression", empty)
     assert "all packings failed" in " ".join(text.get_text() for axes in figure.axes for text in axes.texts)
+
+
+def test_shared_packings_count_once_and_points_are_told_by_what_they_have(data: StudyData) -> None:
+    found = captions.study_values(data)
+    assert found["counts"]["n"] == 3 and found["points"] == 3
+    assert found["made"] == "are pressed from a random cloud as in a filter"
+    assert found["lowest"]["where"] == "adhesion 10 mJ/m², friction 0, 10 kPa"
+    assert found["highest"]["where"] == "adhesion 10 mJ/m², friction 0, 200 kPa"
