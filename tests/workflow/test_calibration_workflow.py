@@ -12,8 +12,9 @@ import pytest
 from checkouts import Checkout, copy_project
 
 from filtercake.calibration.config import load_calibration, settings_of
-from filtercake.calibration.fit import Parameter
-from filtercake.calibration.rounds import conclude, summary
+from filtercake.calibration.response import Parameter
+from filtercake.calibration.rounds import conclude
+from filtercake.calibration.tables import summary
 from filtercake.figures.calibrated import with_interval
 
 TINY = "config/test/calibration/tiny.yaml"

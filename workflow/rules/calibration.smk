@@ -59,7 +59,7 @@ checkpoint calibrate_cohesion:
         mem_mb=1000,
         runtime=10,
     params:
-        library=library("calibration.rounds"),
+        library=library("calibration.tables"),
         calibration=calibration_params,
         packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",
     message:
@@ -88,7 +88,7 @@ rule predictions:
         mem_mb=1000,
         runtime=10,
     params:
-        library=library("calibration.rounds"),
+        library=library("calibration.tables"),
         tables=library("results.paper_tables"),
         calibration=calibration_params,
         packings=lambda wildcards: f"{RESULTS}/{wildcards.calibration}/packings",

@@ -20,7 +20,7 @@ KNOWN_POINTS.update(
         for name, group in CANDIDATES.items()
     }
 )
-TABLES = ["parity", "objective", "response", "simulated"]
+TABLES = ["parity", "objective", "response", "simulated", "pressures"]
 
 
 def calibration_of(wildcards):
@@ -57,7 +57,8 @@ def all_rounds(wildcards):
 
 def manifests_of(wildcards, points):
     folder = f"{RESULTS}/{wildcards.calibration}/packings"
-    return [f"{folder}/{point}/{MANIFEST}" for point in points]
+    known = KNOWN_POINTS[wildcards.calibration]
+    return [f"{folder}/{known[name].packings}/{MANIFEST}" for name in points]
 
 
 def manifests_of_rounds(rounds):

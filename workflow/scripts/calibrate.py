@@ -1,8 +1,8 @@
-"""Rule calibrate_cohesion: fit the cohesion to the measured resistances."""
+"""Rule calibrate_cohesion: fit a calibration's parameters to the measured resistances."""
 
 from pathlib import Path
 
-from filtercake.calibration import rounds
+from filtercake.calibration import tables as tabulate
 from filtercake.calibration.rounds import Task, conclude, prediction_points
 from filtercake.packing.result import publish, read_record, write_json
 from filtercake.run.job import job
@@ -15,12 +15,13 @@ with job(snakemake.log[0], snakemake.output) as log:
     outcome = conclude(task.settings, task.observations, simulated)
     for finding in outcome.findings:
         log.info("%s: %s", finding.kind, finding.text)
-    record = rounds.summary(outcome, task.settings, made[-1]["why"])
+    record = tabulate.summary(outcome, task.settings, made[-1]["why"])
     record["prediction_points"] = list(prediction_points(task.settings, task.candidates, outcome.fit))
     tables = {
-        "parity": rounds.parity_table(outcome, task.settings, task.observations),
-        "objective": rounds.objective_table(outcome, task.settings),
-        "response": rounds.response_table(outcome, task.settings),
+        "parity": tabulate.parity_table(outcome, task.settings, task.observations),
+        "objective": tabulate.objective_table(outcome, task.settings),
+        "response": tabulate.response_table(outcome, task.settings, task.observations),
+        "pressures": tabulate.pressures_table(outcome),
         "simulated": simulated,
     }
     for output in map(Path, snakemake.output.tables):

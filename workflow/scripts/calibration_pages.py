@@ -27,5 +27,5 @@ with job(snakemake.log[0]):
     templates = Path(snakemake.input.front).parent
     captions.write(templates, figures, captions.calibration_values(data), Path(snakemake.output.captions))
     study = Study.model_validate(snakemake.params.study)
-    found = pages.contents(folder, data.simulated, study, describe(Path(snakemake.scriptdir).parents[1]))
+    found = pages.contents(folder, data.packings, study, describe(Path(snakemake.scriptdir).parents[1]))
     pages.write(Path(snakemake.input.page), found, Path(snakemake.output.pages))

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from filtercake.calibration.rounds import Task, conclude, prediction_table
+from filtercake.calibration.rounds import Task, conclude
+from filtercake.calibration.tables import prediction_table
 from filtercake.packing.result import publish, read_record
 from filtercake.results.filter_design import drum_of
 from filtercake.run.job import job

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from filtercake.calibration.fit import ADVISED_FRICTIONS, Finding, Observation, Parameter, advised_friction
+from filtercake.calibration.fit import ADVISED_FRICTIONS, UNITS, Finding, Observation, advised_friction, cake_of
 from filtercake.calibration.measurements import (
     Measurement,
     Measurements,
@@ -20,38 +21,48 @@ from filtercake.calibration.measurements import (
     pressure_effects,
     same_pressure,
 )
+from filtercake.calibration.response import Parameter
 from filtercake.calibration.rounds import BATCHES, Candidate, Settings
 from filtercake.calibration.units_check import unit_problems
 from filtercake.errors import ConfigError, Problem, shown
 from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.filtration.resistance import implied_porosity, law_of
 from filtercake.packing import contact_law
-from filtercake.packing.scene import GRAVITY_PROTOCOL
+from filtercake.packing.engines.embedded import Embedded
+from filtercake.packing.scene import FILTRATION_PROTOCOL
 from filtercake.statistics import quantile
-from filtercake.study.config.packing import EngineName
-from filtercake.study.config.study import MOST_DISTRIBUTIONS, Workflow
-from filtercake.study.config.sweep import Sweep
+from filtercake.study.config.packing import AUTO, EngineName
+from filtercake.study.config.study import MOST_DISTRIBUTIONS, Study, Workflow
+from filtercake.study.config.sweep import SWEPT, Sweep
 from filtercake.study.config.values import (
     MOST_POINTS,
     NAME,
     TO_NUMBER,
     TO_TEXT,
     TO_WHOLE,
+    Adhesion,
     Cohesion,
     Friction,
     Model,
     Name,
     PathText,
 )
-from filtercake.study.limits import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
+from filtercake.study.limits import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP, refusals, small_beds
 from filtercake.study.loading import LoadedStudy, find_studies, load_study, parse
 from filtercake.study.points import ChooseEngine, expand
-from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL
+from filtercake.study.scenes import scene_of
+from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, tidy
 from filtercake.user_files import is_file, read_yaml
 
 Pressure = Annotated[float, Field(ge=0.001, le=10_000, allow_inf_nan=False), TO_NUMBER]
 MOST_FRICTIONS = 50
 """Coefficients of friction that a calibration packs at."""
+PRESSED_FRICTIONS = (0.0, 0.025, 0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7)
+"""Frictions at which pressed cakes may be packed where a calibration names none; closer where porosity falls faster."""
+ADHESIONS = 9
+"""Works of adhesion at which a pressed packing is evaluated where a range is fitted."""
+OF_BEDS = ("cohesion_kJ_m3", "friction", "rival_friction", "pressure_kPa")
+"""Keys that calibrations of pressed cakes do not take."""
 
 
 class CohesionRange(Model):
@@ -77,6 +88,24 @@ class CohesionRange(Model):
         return [float(f"{value:.10g}") for value in np.linspace(self.low, self.high, count + 1)]
 
 
+class AdhesionRange(Model):
+    """Range of works of adhesion that are tried."""
+
+    low: Adhesion = Field(default=0.0, description="Lowest work of adhesion, mJ/m2.")
+    high: Adhesion = Field(description="Highest work of adhesion, mJ/m2.")
+
+    @model_validator(mode="after")
+    def _ascending(self) -> AdhesionRange:
+        if not self.low < self.high:
+            raise ValueError("low must be below high")
+        return self
+
+    def values(self) -> list[float]:
+        """Return works of adhesion at which packings are evaluated, mJ/m2: closer where porosity changes faster."""
+        share = np.linspace(0.0, 1.0, ADHESIONS) ** 2
+        return [float(f"{self.low + (self.high - self.low) * part:.10g}") for part in share]
+
+
 class Calibration(Model):
     """What is fitted to which measurements."""
 
@@ -97,7 +126,14 @@ class Calibration(Model):
         "under 0.4, and 0.05 above.",
     )
     fit_friction: Annotated[list[Friction], Field(min_length=3, max_length=MOST_FRICTIONS)] | None = Field(
-        default=None, description="Fit the friction too, with packings at these values (at least 3)."
+        default=None,
+        description="Fit the friction too, with packings at these values (at least 3). Of pressed cakes the friction "
+        f"is always fitted; if left out, with packings at some of {', '.join(f'{mu:g}' for mu in PRESSED_FRICTIONS)}.",
+    )
+    adhesion_mJ_m2: Adhesion | AdhesionRange | None = Field(  # noqa: N815
+        default=None,
+        description="Work of adhesion of pressed cakes, mJ/m2: a number to take, or a range (low, high) to fit it too; "
+        "the study's attraction if left out.",
     )
     rival_friction: Annotated[list[Friction], Field(max_length=MOST_FRICTIONS)] | None = Field(
         default=None,
@@ -116,7 +152,9 @@ class Calibration(Model):
         default=4, description="At most so many rounds of packings; later ones are made near the optimum."
     )
     relative_ci95_target: Annotated[float, Field(ge=1e-4, lt=10, allow_inf_nan=False), TO_NUMBER] = Field(
-        default=0.1, description="Half-width of the cohesion's 95 % interval, over its value, that ends the rounds."
+        default=0.1,
+        description="Half-width of the 95 % interval of the cohesion (the friction of pressed cakes), over its value, "
+        "that ends the rounds.",
     )
     predict: Annotated[list[Name], Field(max_length=MOST_DISTRIBUTIONS)] = Field(
         default=[], description="Distributions of the study, never tested, whose resistance is predicted."
@@ -154,7 +192,7 @@ class LoadedCalibration:
     implied_porosity : float
         Mean porosity that the measured resistances imply.
     frictions : tuple of float
-        Those packed: one and its rivals, or all that the fit of the friction needs.
+        Those packed: one and its rivals, or all that the fit of the friction may need.
     """
 
     name: str
@@ -173,13 +211,42 @@ class LoadedCalibration:
         return self.study.warnings
 
     @property
+    def is_pressed(self) -> bool:
+        """Whether the packings are pressed cakes."""
+        return self.study.model.packing.protocol == FILTRATION_PROTOCOL
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The fitted parameters."""
+        if self.is_pressed:
+            friction = Parameter("friction", self.frictions[0], self.frictions[-1])
+            wanted = self.model.adhesion_mJ_m2
+            if not isinstance(wanted, AdhesionRange):
+                return (friction,)
+            return (friction, Parameter("adhesion_mJ_m2", wanted.low, wanted.high))
         cohesion = self.model.cohesion_kJ_m3
         found = (Parameter("cohesion_kJ_m3", cohesion.low, cohesion.high),)
         if self.model.fit_friction is None:
             return found
         return (*found, Parameter("friction", self.frictions[0], self.frictions[-1]))
+
+    @property
+    def attractions(self) -> tuple[str, tuple[float, ...]]:
+        """What makes pressed crystals stick: the property and the values at which packings are evaluated."""
+        wanted, material = self.model.adhesion_mJ_m2, self.study.model.material
+        if isinstance(wanted, AdhesionRange):
+            return "adhesion_mJ_m2", tuple(wanted.values())
+        if wanted is None and material.adhesion_mJ_m2 is None:
+            return "cohesion_kJ_m3", (material.cohesion_kJ_m3,)
+        return "adhesion_mJ_m2", (float(wanted if wanted is not None else material.adhesion_mJ_m2 or 0.0),)
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        """Pressure drops at which pressed cakes are evaluated, ascending, kPa; the study's own is among them."""
+        if not self.is_pressed:
+            return ()
+        own = self.study.model.base("pressure_kPa")
+        return tuple(sorted({*(item.pressure_kPa or 0.0 for item in self.observations), float(own or 0.0)}))
 
     @property
     def packed(self) -> tuple[str, ...]:
@@ -249,37 +316,46 @@ def load_calibration(path: Path, studies: Path) -> LoadedCalibration:
     problems = list(_problems(model, study, measurements, path))
     if problems:
         raise ConfigError(problems)
-    observations = tuple(_observations(measurements, model.pressure_kPa))
+    pressed = study.model.packing.protocol == FILTRATION_PROTOCOL
+    observations = tuple(
+        _pressed_observations(measurements, study.model.base("pressure_kPa"))
+        if pressed
+        else _observations(measurements, model.pressure_kPa)
+    )
     porosity = _implied_porosity(study, observations)
     name = f"calibration_{path.stem}"
     warnings = (*measurements.warnings, *_doubts(model, study, path))
     asked = {"replicates": model.replicates, "engine": model.engine or study.model.packing.engine}
     packing = study.model.packing.model_copy(update=asked)
     own = study.model.model_copy(update={"packing": packing})
-    return LoadedCalibration(
+    doubts = _pressed_doubts(measurements, own) if pressed else _measured_doubts(measurements, model.pressure_kPa)
+    loaded = LoadedCalibration(
         name=name,
         path=path,
         model=model,
         study=replace(study, name=name, model=own, warnings=warnings),
         measurements=measurements,
         observations=observations,
-        doubts=tuple(_measured_doubts(measurements, model.pressure_kPa)),
+        doubts=tuple(doubts),
         implied_porosity=porosity,
-        frictions=_frictions(model, porosity, len({item.csd for item in observations})),
+        frictions=tuple(model.fit_friction or PRESSED_FRICTIONS)
+        if pressed
+        else _frictions(model, porosity, len({item.csd for item in observations})),
     )
+    refused = list(_scene_problems(loaded)) if pressed else []
+    if refused:
+        raise ConfigError(refused)
+    return loaded
 
 
 def candidates(calibration: LoadedCalibration, choose_engine: ChooseEngine) -> list[Candidate]:
     """List every point that a calibration may come to need.
 
-    A batch of more replicates is the same point with another base seed.
+    A batch of more replicates is the same point with another base seed. A point of pressed cakes stands for its
+    packings, which serve every pressure and attraction.
     """
     found: list[Candidate] = []
-    sweep = Sweep(
-        csd=list(calibration.packed),
-        cohesion_kJ_m3=calibration.model.cohesion_kJ_m3.values(),
-        friction=list(calibration.frictions),
-    )
+    sweep = Sweep(csd=list(calibration.packed), friction=list(calibration.frictions), **_swept(calibration))
     for batch in range(BATCHES):
         packing = calibration.study.model.packing
         packing = packing.model_copy(update={"seed": packing.seed + batch})
@@ -289,25 +365,76 @@ def candidates(calibration: LoadedCalibration, choose_engine: ChooseEngine) -> l
     return found
 
 
+def _swept(calibration: LoadedCalibration) -> dict[str, list[float]]:
+    """Values of a sweep over a calibration's points, besides distributions and frictions."""
+    if not calibration.is_pressed:
+        return {"cohesion_kJ_m3": calibration.model.cohesion_kJ_m3.values()}
+    name, values = calibration.attractions
+    # one that sticks stands for all that do, one that does not for itself
+    return {name: [values[-1]], "pressure_kPa": [calibration.pressures[-1]]}
+
+
 def settings_of(calibration: LoadedCalibration) -> Settings:
     """Return what the calibration's jobs need to know."""
-    model, material = calibration.model, calibration.study.model.material
+    model, material, pressed = calibration.model, calibration.study.model.material, calibration.is_pressed
+    beside, values = calibration.attractions if pressed else ("friction", calibration.frictions)
     return Settings(
         parameters=calibration.parameters,
-        frictions=calibration.frictions,
+        levels=calibration.frictions if pressed else tuple(model.cohesion_kJ_m3.values()),
+        beside=beside,
+        beside_levels=values,
+        pressures_kPa=calibration.pressures,
+        predicted_pressure_kPa=calibration.study.model.base("pressure_kPa") if pressed else None,
         measured=calibration.measured,
         predicted=tuple(model.predict),
-        cohesions=tuple(model.cohesion_kJ_m3.values()),
         estimator=model.estimator,
         rounds=model.rounds,
         relative_ci95_target=model.relative_ci95_target,
         density=material.density,
         sphericity=material.sphericity,
         implied_porosity=calibration.implied_porosity,
-        soft_above=_cohesion_at(DOUBTFUL_RELATIVE_OVERLAP, calibration.study),
+        soft_above=math.inf if pressed else _cohesion_at(DOUBTFUL_RELATIVE_OVERLAP, calibration.study),
         doubts=calibration.doubts,
         resistance_law=calibration.study.model.resistance_law,
     )
+
+
+def _pressed_observations(measurements: Measurements, own: float | None) -> Iterable[Observation]:
+    """Measurements as the fit of pressed cakes takes them: each at its pressure drop, or at the study's, kPa."""
+    known: list[float] = []
+    for item in measurements.measurements:
+        drop = own if item.pressure_drop is None else tidy(item.pressure_drop / KILOPASCAL)
+        at = float(drop or 0.0)
+        same = next((value for value in known if same_pressure(value, at)), at)
+        known.append(same)
+        yield Observation(item.name, item.csd, math.log(item.resistance), item.relative_se, same)
+
+
+def _pressed_doubts(measurements: Measurements, study: Study) -> Iterable[Finding]:
+    yield from (Finding("contradiction", text) for text in measurements.contradictions)
+    for item in measurements.measurements:
+        if item.pressure_drop is None:
+            drop = study.base("pressure_kPa")
+            text = f"{item.name} of {item.csd} is of an unknown pressure, and taken for one at the study's {drop:g} kPa"
+            yield Finding("pressure", text)
+
+
+def _scene_problems(calibration: LoadedCalibration) -> Iterable[Problem]:
+    """Cakes that cannot be pressed: loads and attractions that leave what pressed cells are known for."""
+    name, values = calibration.attractions
+    measured = {(item.csd, float(item.pressure_kPa or 0.0)) for item in calibration.observations}
+    own = float(calibration.study.model.base("pressure_kPa") or 0.0)
+    cakes = sorted(measured | {(csd, own) for csd in calibration.model.predict})
+    said: set[str] = set()
+    for (csd, pressure), value in itertools.product(cakes, sorted({values[0], values[-1]})):
+        swept = {prop: calibration.study.model.base(prop) for prop in SWEPT}
+        swept |= {"friction": calibration.frictions[-1], "pressure_kPa": pressure, name: value}
+        scene = scene_of(calibration.study.model, calibration.study.csds[csd].truncated, swept, FILTRATION_PROTOCOL)
+        for finding in (*refusals(scene), *small_beds(scene)):
+            text = f"{csd} at {pressure:g} kPa and {value:g} {UNITS[name]}: {finding.text}"
+            if finding.text not in said:
+                said.add(finding.text)
+                yield Problem(str(calibration.path), finding.key, cake_of(csd, pressure), text)
 
 
 def _observations(measurements: Measurements, pressure: float | None) -> Iterable[Observation]:
@@ -368,18 +495,14 @@ def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements
     known = ", ".join(study.csds)
     packed = len({*model.predict, *(item.csd for item in measurements.measurements)})
     frictions = len(model.fit_friction or [0, *(model.rival_friction or [0])])
-    points = packed * len(model.cohesion_kJ_m3.values()) * frictions * BATCHES
+    pressed = study.model.packing.protocol == FILTRATION_PROTOCOL
+    points = packed * (1 if pressed else len(model.cohesion_kJ_m3.values())) * frictions * BATCHES
     if law_of(study.model.resistance_law).needs_kozeny_constant:
         allowed = (
             f"its resistance_law is {study.model.resistance_law}, which no calibration solves: use carman or additive"
         )
         yield Problem(str(path), "study", shown(model.study), allowed)
-    if study.model.packing.protocol != GRAVITY_PROTOCOL:
-        allowed = (
-            f"its packing.protocol is {study.model.packing.protocol}, whose packings no calibration fits yet: "
-            f"use {GRAVITY_PROTOCOL}"
-        )
-        yield Problem(str(path), "study", shown(model.study), allowed)
+    yield from _protocol_problems(model, study, measurements, path)
     if points > MOST_POINTS:
         allowed = f"must be at most {MOST_POINTS} points: use a larger step, fewer frictions or distributions"
         yield Problem(str(path), "cohesion_kJ_m3.step", f"{points} points", allowed)
@@ -392,17 +515,49 @@ def _problems(model: Calibration, study: LoadedStudy, measurements: Measurements
         if name not in study.csds:
             yield Problem(str(path), f"predict[{index}]", repr(name), f"not in the study; allowed: {known}")
     yield from unit_problems(measurements, study, model.measurements)
-    for csd, fit in _brought(measurements, model.pressure_kPa).items():
+    for csd, fit in _brought(measurements, None if pressed else model.pressure_kPa).items():
         if not math.isfinite(fit.exponent_ci95):
             text = f"two measurements of {csd} give no interval at another pressure: add a third, or leave the key out"
             yield Problem(str(path), "pressure_kPa", f"{model.pressure_kPa:g}", text)
-    limit = _cohesion_at(LARGEST_RELATIVE_OVERLAP, study)
+    limit = math.inf if pressed else _cohesion_at(LARGEST_RELATIVE_OVERLAP, study)
     if model.cohesion_kJ_m3.high > limit:
         text = f"must be at most {int(limit)} kJ/m3 at the study's Young's modulus: above it contacts are too soft"
         yield Problem(str(path), "cohesion_kJ_m3.high", f"{model.cohesion_kJ_m3.high:g}", text)
 
 
+def _protocol_problems(
+    model: Calibration, study: LoadedStudy, measurements: Measurements, path: Path
+) -> Iterable[Problem]:
+    """Keys that the study's protocol does not know, or needs."""
+    protocol = study.model.packing.protocol
+    where = f"the study's packing.protocol is {protocol}"
+    if protocol != FILTRATION_PROTOCOL:
+        if model.adhesion_mJ_m2 is not None:
+            yield Problem(str(path), "adhesion_mJ_m2", "given", f"{where}: its cohesion is fitted; leave the key out")
+        return
+    whys = {
+        "cohesion_kJ_m3": "the friction is fitted, and adhesion_mJ_m2 with it where a range is given",
+        "friction": "the friction is fitted: fit_friction names the values packed",
+        "rival_friction": "the friction is fitted: fit_friction names the values packed",
+        "pressure_kPa": "every resistance is compared with cakes at its own pressure drop",
+    }
+    for key in OF_BEDS:
+        if key in model.model_fields_set and getattr(model, key) is not None:
+            yield Problem(str(path), key, "given", f"{where}: {whys[key]}; leave the key out")
+    if model.estimator != "interior":
+        yield Problem(str(path), "estimator", model.estimator, f"{where}: pressed cakes have an interior only")
+    if model.engine not in (None, AUTO, Embedded.name):
+        allowed = f"{where}: cakes are pressed by the embedded engine; allowed: {AUTO!r}, {Embedded.name!r}"
+        yield Problem(str(path), "engine", shown(model.engine), allowed)
+    unknown = [item.name for item in measurements.measurements if item.pressure_drop is None]
+    if study.model.base("pressure_kPa") is None and (unknown or model.predict):
+        what = f"{unknown[0]} has no pressure_drop_kPa" if unknown else "predict needs the pressure to predict at"
+        yield Problem(str(path), "study", shown(model.study), f"{what}: give the study a packing.pressure_kPa")
+
+
 def _doubts(model: Calibration, study: LoadedStudy, path: Path) -> Iterable[str]:
+    if study.model.packing.protocol == FILTRATION_PROTOCOL:
+        return
     limit = _cohesion_at(DOUBTFUL_RELATIVE_OVERLAP, study)
     if model.cohesion_kJ_m3.high > limit:
         yield (

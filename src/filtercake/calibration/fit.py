@@ -1,41 +1,43 @@
-"""Cohesion (and friction) from measured cake resistances: a smooth model of the packings, weighted least squares.
+"""Cohesion, friction or adhesion from measured resistances: a smooth model of the packings, weighted least squares.
 
-The packings give ln(alpha) at a few cohesions, with the noise of a few replicates. A Gaussian process per
-distribution joins them; the parameters are those at which all measured ln(alpha) are most likely; intervals come
-from the profile of the likelihood, so that they hold what the measurements and the packings leave open.
+The packings give ln(alpha) at a few values of a parameter, with the noise of a few replicates. A Gaussian process per
+cake joins them (a cake is a distribution, at a pressure where its packings know one); the parameters are those at which
+all measured ln(alpha) are most likely; intervals come from the profile of the likelihood, so that they hold what the
+measurements and the packings leave open.
 """
 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
 from filtercake.calibration.pooling import Pool, improbable, pool
+from filtercake.calibration.response import Parameter, Responds
 from filtercake.errors import CalibrationError
-from filtercake.statistics import CONFIDENCE, effective_freedom, likelihood_limit, pooled_spread
-from filtercake.units import FloatArray
-
-if TYPE_CHECKING:
-    from sklearn.gaussian_process import GaussianProcessRegressor
+from filtercake.statistics import CONFIDENCE, effective_freedom, likelihood_limit
+from filtercake.units import FloatArray, IntArray
 
 GRID = (801, 41)
 """Grid points of the cohesion and, where it is fitted, of the friction."""
-SHRINKAGE = 8.0
-"""Degrees of freedom that the pooled variance of replicates weighs against a point's own."""
-LENGTH_SCALES = (0.1, 3.0)
-"""Shortest and longest correlation length of ln(alpha), over the range of the parameter."""
 ADVISED_FRICTIONS = (0.0, 0.05)
 """What the paper advises for dense and for loose cakes."""
+UNITS = {"cohesion_kJ_m3": "kJ/m3", "friction": "", "adhesion_mJ_m2": "mJ/m2"}
+"""Units of parameters."""
 FLAT = 0.8
 """Share of a parameter's range from which its interval says that it is not determined."""
 DRAWS = 20_000
 """Random draws behind the interval of a prediction."""
+ENDS = (0.5 * (1.0 - CONFIDENCE), 0.5, 0.5 * (1.0 + CONFIDENCE))
+"""Quantiles of a 95 % interval's ends and of the median."""
+SHARED_DISCREPANCY = 0.5
+"""Correlation of what no packing explains, between cakes of one distribution at several pressures.
+
+What a sphere is not may be the same at all of them, or change with the pressure: nothing tells how much of it does.
+"""
 
 
 @dataclass(frozen=True)
@@ -50,34 +52,25 @@ class Observation:
         Natural logarithm of the resistance in m/kg.
     standard_error : float
         Standard error of that, i.e. the relative one of the resistance.
+    pressure_kPa : float or None
+        Pressure drop, kPa, where the packings know it.
     """
 
     name: str
     csd: str
     ln_resistance: float
     standard_error: float
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter of the packings, with its range.
-
-    Attributes
-    ----------
-    name : str
-        ``cohesion_kJ_m3`` or ``friction``.
-    low, high : float
-        Its range, in the unit the name says.
-    """
-
-    name: str
-    low: float
-    high: float
+    pressure_kPa: float | None = None  # noqa: N815
 
     @property
-    def span(self) -> float:
-        """Width of the range."""
-        return self.high - self.low
+    def cake(self) -> str:
+        """Name of the cake: measurements of one are of the same quantity."""
+        return cake_of(self.csd, self.pressure_kPa)
+
+
+def cake_of(csd: str, pressure_kpa: float | None) -> str:
+    """Name the cake of a distribution, at a pressure drop in kPa where its packings know one."""
+    return csd if pressure_kpa is None else f"{csd} at {pressure_kpa:g} kPa"
 
 
 @dataclass(frozen=True)
@@ -145,7 +138,7 @@ class Calibration:
     chi_square : float
         Weighted sum of squares at the best parameters, with the discrepancy left out.
     degrees_of_freedom : int
-        Distributions measured less parameters fitted; at least 0.
+        Cakes measured less parameters fitted; at least 0.
     discrepancy : float
         Standard deviation of ln(alpha) between measurements and packings that nothing else explains; 0 where
         nothing is left to explain.
@@ -153,8 +146,8 @@ class Calibration:
         What a user must know.
     model_share : float
         Share of the packings in the variance of the residuals at the best parameters.
-    residual, measured_variance, packed_variance : ndarray, shape (distributions,)
-        Measured less packed ln(alpha) at the best parameters, and the variances of both, by distribution.
+    residual, measured_variance, packed_variance : ndarray, shape (cakes,)
+        Measured less packed ln(alpha) at the best parameters, and the variances of both, by cake.
     """
 
     parameters: tuple[Parameter, ...]
@@ -198,81 +191,17 @@ class Prediction:
     high: float
 
 
-class Response:
-    """ln(alpha) of one distribution as a smooth function of the parameters, with its standard error."""
-
-    def __init__(self, parameters: Sequence[Parameter], points: FloatArray, ln_resistance: Sequence[FloatArray]):
-        """Fit a Gaussian process (Matern 5/2) to the means of replicates.
-
-        Parameters
-        ----------
-        parameters : sequence of Parameter
-            The axes of ``points``.
-        points : ndarray, shape (n, d)
-            Where packings were made.
-        ln_resistance : sequence of n ndarrays
-            ln(alpha), alpha in m/kg, of the replicates at each point.
-
-        Raises
-        ------
-        CalibrationError
-            With fewer than three points, or without any point of two replicates.
-        """
-        if len(points) < 3:
-            raise CalibrationError(f"{len(points)} points with packings are too few: at least 3 are needed")
-        self.parameters = tuple(parameters)
-        self.points = np.asarray(points, dtype=np.float64)
-        self.mean = np.array([values.mean() for values in ln_resistance])
-        self.standard_error = np.sqrt(_variances(ln_resistance) / [values.size for values in ln_resistance])
-        self.centre = float(self.mean.mean())
-        self.scale = max(float(self.mean.std()), 1e-6)
-        self.process = self._fitted()
-
-    def _fitted(self) -> GaussianProcessRegressor:
-        # here, because parsing the workflow must not cost this import
-        from sklearn.exceptions import ConvergenceWarning
-        from sklearn.gaussian_process import GaussianProcessRegressor
-        from sklearn.gaussian_process.kernels import ConstantKernel, Matern
-
-        kernel = ConstantKernel(1.0, (0.05, 50.0)) * Matern(
-            np.full(len(self.parameters), 0.5), [LENGTH_SCALES] * len(self.parameters), nu=2.5
-        )
-        noise = np.maximum((self.standard_error / self.scale) ** 2, 1e-10)
-        process = GaussianProcessRegressor(kernel, alpha=noise, n_restarts_optimizer=1, random_state=0)
-        with warnings.catch_warnings():
-            # a length at the end of its range is an answer, not a failure
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            process.fit(self._unit(self.points), (self.mean - self.centre) / self.scale)
-        return process
-
-    def __call__(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance of ln(alpha) at points (n, d), each of shape (n,)."""
-        mean, deviation = self.process.predict(self._unit(points), return_std=True)
-        return self.centre + self.scale * mean, (self.scale * deviation) ** 2
-
-    def _unit(self, points: FloatArray) -> FloatArray:
-        low = np.array([parameter.low for parameter in self.parameters])
-        span = np.array([parameter.span for parameter in self.parameters])
-        return np.asarray((np.atleast_2d(points) - low) / span, dtype=np.float64)
-
-
-def _variances(samples: Sequence[FloatArray]) -> FloatArray:
-    """Variance of one replicate at each point: its own, drawn towards that of all points."""
-    freedom = np.array([values.size - 1.0 for values in samples])
-    squares = np.array([float(np.sum((values - values.mean()) ** 2)) for values in samples])
-    pooled = pooled_spread(samples)
-    if not pooled.freedom > 0.0:
-        raise CalibrationError("no point has two accepted packings: their spread is not known; ask for more replicates")
-    return np.asarray((SHRINKAGE * pooled.sd**2 + squares) / (SHRINKAGE + freedom), dtype=np.float64)
-
-
-def calibrate(observations: Sequence[Observation], responses: Mapping[str, Response]) -> Calibration:
+def calibrate(
+    observations: Sequence[Observation], responses: Mapping[str, Responds], packed_correlation: float = 0.0
+) -> Calibration:
     """Find the parameters at which the packings' resistances are the measured ones.
 
     Maximum likelihood: weighted least squares in ln(alpha), the weights made of the measurements' errors and of the
-    packings' own. Measurements of one distribution share the error of its packings. Where they contradict each other,
-    their scatter is added to the errors of each. Where the distributions scatter more than the errors do on
-    average, a discrepancy between measurements and packings, one per distribution, is estimated and added.
+    packings' own. Measurements of one cake share the error of its packings. Where they contradict each other,
+    their scatter is added to the errors of each. Where the cakes scatter more than the errors do on average, a
+    discrepancy between measurements and packings, one per cake, is estimated and added. Cakes of one distribution at
+    several pressures are of the same packings: their errors are correlated (``packed_correlation``), and their
+    discrepancies by ``SHARED_DISCREPANCY``.
 
     An interval is the wider of two: by the errors, and by the spread of the distributions about the best parameters
     (Student, with the degrees of freedom that the fit leaves them). The second covers whatever stands between the
@@ -283,8 +212,10 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
     ----------
     observations : sequence of Observation
         What was measured.
-    responses : mapping of str to Response
-        The packings, by distribution; all of the same parameters.
+    responses : mapping of str to Response or SharedResponse
+        The packings, by cake; all of the same parameters.
+    packed_correlation : float
+        Correlation of the packings' errors between cakes of one distribution, 0 to 1.
 
     Raises
     ------
@@ -293,16 +224,16 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
     """
     if not observations:
         raise CalibrationError("there is no measurement to calibrate with")
-    missing = sorted({item.csd for item in observations} - set(responses))
+    missing = sorted({item.cake for item in observations} - set(responses))
     if missing:
         raise CalibrationError(f"not enough packings of {', '.join(missing)} for a fit")
-    parameters = responses[observations[0].csd].parameters
+    parameters = responses[observations[0].cake].parameters
     axes = tuple(
         np.linspace(parameter.low, parameter.high, points) for parameter, points in zip(parameters, GRID, strict=False)
     )
     grid = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
     shape = tuple(axis.size for axis in axes)
-    residual, chosen = _residuals(observations, responses, grid)
+    residual, chosen = _residuals(observations, responses, grid, packed_correlation)
     freedom = max(len(chosen.names) - len(parameters), 0)
     chi_square, discrepancy = _misfit(residual, chosen, freedom)
     deviance = _deviance(residual, chosen, discrepancy).reshape(shape)
@@ -335,45 +266,72 @@ def calibrate(observations: Sequence[Observation], responses: Mapping[str, Respo
 
 
 def pooled(observations: Sequence[Observation]) -> dict[str, Pool]:
-    """Average ln(alpha) by distribution, the scatter of measurements that contradict each other included."""
+    """Average ln(alpha) by cake, the scatter of measurements that contradict each other included."""
     found = {}
-    for name in sorted({item.csd for item in observations}):
-        own = [item for item in observations if item.csd == name]
+    for name in sorted({item.cake for item in observations}):
+        own = [item for item in observations if item.cake == name]
         found[name] = pool([item.ln_resistance for item in own], [item.standard_error for item in own])
     return found
 
 
 @dataclass(frozen=True)
 class _Groups:
-    """Variances by distribution: of the mean of its measurements (m,), and of its packings on the grid (m, n).
+    """Variances by cake: of the mean of its measurements (m,), and of its packings on the grid (m, n).
 
-    ``freedom`` (m,) is that of the measurements' variances, infinite where they are known.
+    ``freedom`` (m,) is that of the measurements' variances, infinite where they are known. ``packed`` and
+    ``discrepant`` (m, m) are the correlations of the packings' errors and of the discrepancies.
     """
 
     names: tuple[str, ...]
     measured: FloatArray
     freedom: FloatArray
     model: FloatArray
+    packed: FloatArray
+    discrepant: FloatArray
+
+    @property
+    def apart(self) -> bool:
+        """Whether every cake has packings of its own."""
+        return not np.any(self.discrepant - np.eye(len(self.names)))
 
 
 def _residuals(
-    observations: Sequence[Observation], responses: Mapping[str, Response], grid: FloatArray
+    observations: Sequence[Observation], responses: Mapping[str, Responds], grid: FloatArray, correlation: float
 ) -> tuple[FloatArray, _Groups]:
-    """Measured less packed ln(alpha) by distribution, shape (m, n), and the variances.
+    """Measured less packed ln(alpha) by cake, shape (m, n), and the variances.
 
-    The measurements of a distribution enter by their weighted mean: it holds all they say about the parameters.
+    The measurements of a cake enter by their weighted mean: it holds all they say about the parameters.
     """
     measured = pooled(observations)
     packed = [responses[name](grid) for name in measured]
     residual = np.array([own.mean - mean for own, (mean, _) in zip(measured.values(), packed, strict=True)])
     variance = np.array([own.variance for own in measured.values()])
     freedom = np.array([own.freedom for own in measured.values()])
-    return residual, _Groups(tuple(measured), variance, freedom, np.array([model for _, model in packed]))
+    csds = {item.cake: item.csd for item in observations}
+    same = np.array([[float(csds[one] == csds[other]) for other in measured] for one in measured])
+    alike = same - np.eye(len(measured))
+    return residual, _Groups(
+        names=tuple(measured),
+        measured=variance,
+        freedom=freedom,
+        model=np.array([model for _, model in packed]),
+        packed=np.eye(len(measured)) + correlation * alike,
+        discrepant=np.eye(len(measured)) + SHARED_DISCREPANCY * alike,
+    )
 
 
 def _squares(residual: FloatArray, groups: _Groups, discrepancy: float) -> tuple[FloatArray, FloatArray]:
-    variance = groups.measured[:, None] + groups.model + discrepancy**2
-    return np.sum(residual**2 / variance, axis=0), np.sum(np.log(variance), axis=0)
+    """Weighted sum of squares and ln(determinant of the covariance), each of shape (n,)."""
+    if groups.apart:
+        variance = groups.measured[:, None] + groups.model + discrepancy**2
+        return np.sum(residual**2 / variance, axis=0), np.sum(np.log(variance), axis=0)
+    spread = np.sqrt(groups.model).T
+    covariance = spread[:, :, None] * spread[:, None, :] * groups.packed
+    covariance = covariance + np.diag(groups.measured) + discrepancy**2 * groups.discrepant
+    factor = np.linalg.cholesky(covariance)
+    whitened = np.linalg.solve(factor, residual.T[:, :, None])[:, :, 0]
+    diagonal = np.diagonal(factor, axis1=1, axis2=2)
+    return np.sum(whitened**2, axis=1), 2.0 * np.sum(np.log(diagonal), axis=1)
 
 
 def _deviance(residual: FloatArray, groups: _Groups, discrepancy: float) -> FloatArray:
@@ -389,17 +347,18 @@ def _misfit(residual: FloatArray, groups: _Groups, freedom: int) -> tuple[float,
     chi_square = least(0.0)
     if freedom == 0 or chi_square <= freedom:
         return chi_square, 0.0
-    widest = float(np.sqrt(np.mean(residual**2, axis=0).min() * len(groups.names) / freedom))
+    weakest = float(np.linalg.eigvalsh(groups.discrepant)[0])
+    widest = float(np.sqrt(np.mean(residual**2, axis=0).min() * len(groups.names) / freedom / weakest))
     return chi_square, float(scipy.optimize.brentq(lambda d: least(d) - freedom, 0.0, 1.01 * widest + 1e-9))
 
 
 def _scale(groups: _Groups, chi_square: float, freedom: int) -> tuple[float, float]:
     """Scale of the squares and its degrees of freedom, by which the interval is the widest.
 
-    By the errors it is 1: known, or resting on the scatter of measurements that contradict each other. A distribution's
-    part in the variance of a weighted mean is its weight, the inverse of its variance: one whose measurements scatter
-    counts for little beside others that are sharp. By the distributions it is their mean square about the best
-    parameters, 1 with a discrepancy.
+    By the errors it is 1: known, or resting on the scatter of measurements that contradict each other. A cake's part in
+    the variance of a weighted mean is its weight, the inverse of its variance: one whose measurements scatter counts
+    for little beside others that are sharp. By the cakes it is their mean square about the best parameters, 1 with a
+    discrepancy.
     """
     scales = [(1.0, effective_freedom(1.0 / groups.measured, groups.freedom))]
     if freedom:
@@ -459,17 +418,19 @@ def _degrees(number: int) -> str:
 
 def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     found: list[Finding] = []
-    distributions = calibration.residual.size
+    cakes = calibration.residual.size
     for estimate, axis in zip(calibration.estimates, calibration.axes, strict=True):
         found += _findings_of(estimate, float(axis[1] - axis[0]))
     fitted = len(calibration.parameters)
-    if distributions < fitted:
-        names = " and ".join(_words(parameter.name) for parameter in calibration.parameters)
+    if cakes < fitted:
+        names = " and ".join(words_of(parameter.name) for parameter in calibration.parameters)
+        pressed = any(parameter.name == "adhesion_mJ_m2" for parameter in calibration.parameters)
+        more = "distributions, or at more pressures," if pressed else "distributions"
         found.append(
             Finding(
                 "confounded",
-                f"{distributions} measured distribution{'s' if distributions > 1 else ''} cannot determine {fitted} "
-                f"parameters: {names} trade off against each other; measure more distributions or fix one of them",
+                f"{cakes} measured {'cake' if pressed else 'distribution'}{'s' if cakes > 1 else ''} cannot determine "
+                f"{fitted} parameters: {names} trade off against each other; measure more {more} or fix one of them",
             )
         )
     if improbable(calibration.chi_square, calibration.degrees_of_freedom):
@@ -494,7 +455,7 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
 
 
 def _findings_of(estimate: Estimate, grain: float) -> list[Finding]:
-    parameter, what, width = estimate.parameter, _words(estimate.parameter.name), estimate.parameter.span
+    parameter, what, width = estimate.parameter, words_of(estimate.parameter.name), estimate.parameter.span
     found = []
     if estimate.high - estimate.low >= FLAT * width:
         text = f"the measurements do not determine the {what}: nearly its whole range is in the interval"
@@ -514,46 +475,120 @@ def _findings_of(estimate: Estimate, grain: float) -> list[Finding]:
     return found
 
 
-def _words(name: str) -> str:
-    return {"cohesion_kJ_m3": "cohesion energy density", "friction": "coefficient of friction"}.get(name, name)
+def words_of(parameter: str) -> str:
+    """Name a parameter in words."""
+    known = {
+        "cohesion_kJ_m3": "cohesion energy density",
+        "friction": "coefficient of friction",
+        "adhesion_mJ_m2": "work of adhesion",
+    }
+    return known.get(parameter, parameter)
 
 
-def leave_one_out(observations: Sequence[Observation], responses: Mapping[str, Response]) -> dict[str, float]:
-    """Error of predicting each distribution from all others, in ln(alpha), predicted less measured.
+def with_unit(parameter: str, value: str) -> str:
+    """Write a parameter's value with its unit, where it has one."""
+    return f"{value} {UNITS.get(parameter, '')}".rstrip()
 
-    Empty where the other distributions are fewer than the parameters.
+
+def leave_one_out(
+    observations: Sequence[Observation], responses: Mapping[str, Responds], packed_correlation: float = 0.0
+) -> dict[str, float]:
+    """Error of predicting each cake from those of all other distributions, in ln(alpha), predicted less measured.
+
+    Empty where those are fewer than the parameters.
     """
     measured = pooled(observations)
     errors: dict[str, float] = {}
     fitted = max((len(responses[name].parameters) for name in measured), default=0)
-    for name in measured if len(measured) > fitted else []:
-        others = [item for item in observations if item.csd != name]
-        best = calibrate(others, responses).best
-        errors[name] = float(responses[name](np.array([best]))[0][0]) - measured[name].mean
+    for csd in sorted({item.csd for item in observations}):
+        others = [item for item in observations if item.csd != csd]
+        if len({item.cake for item in others}) < fitted or not others:
+            continue
+        best = calibrate(others, responses, packed_correlation).best
+        for name in sorted({item.cake for item in observations if item.csd == csd}):
+            errors[name] = float(responses[name](np.array([best]))[0][0]) - measured[name].mean
     return errors
 
 
-def predict(calibration: Calibration, response: Response) -> Prediction:
+def predict(calibration: Calibration, response: Responds) -> Prediction:
     """Resistance of a distribution at the calibrated parameters, with an interval.
 
     It holds the uncertainty of the parameters (their likelihood), of the packings of this distribution, and the
     discrepancy that the calibration found. Where the errors' scale was estimated, it is drawn with the parameters:
     their distribution is Student's, and the discrepancy's too.
     """
+    random = np.random.default_rng(0)
+    drawn, scale, grid = _drawn(calibration, random)
+    mean, variance = response(grid)
+    spread = np.sqrt(variance[drawn] + scale * calibration.discrepancy**2)
+    values = mean[drawn] + spread * random.standard_normal(DRAWS)
+    low, median, high = np.exp(np.quantile(values, ENDS))
+    return Prediction(float(median), float(low), float(high))
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How ln(alpha) of calibrated packings changes with the logarithm of the pressure drop.
+
+    Attributes
+    ----------
+    value, low, high : float
+        Median and ends of the 95 % interval.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+def slope(
+    calibration: Calibration, ln_pressure: FloatArray, responses: Sequence[Responds], packed_correlation: float
+) -> Slope:
+    """Compressibility of a distribution's cakes at the calibrated parameters, with an interval.
+
+    It holds the uncertainty of the parameters, of the packings, whose errors are alike at all pressures, and the
+    discrepancy that the calibration found.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The fit.
+    ln_pressure : ndarray, shape (n,)
+        Logarithms of the pressure drops; at least two different ones.
+    responses : sequence of n Response or SharedResponse
+        The packings at those.
+    packed_correlation : float
+        Correlation of their errors between pressures.
+    """
+    random = np.random.default_rng(0)
+    drawn, scale, grid = _drawn(calibration, random)
+    found = [response(grid) for response in responses]
+    mean, deviation = (np.array([part[k] for part in found]) for k in (0, 1))
+    centred = ln_pressure - ln_pressure.mean()
+    weight = centred / np.sum(centred**2)
+    weighted = weight[:, None] * np.sqrt(deviation[:, drawn])
+    alike = _alike(len(responses))
+    noise = np.einsum("id,ij,jd->d", weighted, np.eye(len(responses)) + packed_correlation * alike, weighted)
+    apart = weight @ (np.eye(len(responses)) + SHARED_DISCREPANCY * alike) @ weight
+    spread = np.sqrt(np.maximum(noise, 0.0) + scale * calibration.discrepancy**2 * apart)
+    low, median, high = np.quantile(weight @ mean[:, drawn] + spread * random.standard_normal(DRAWS), ENDS)
+    return Slope(float(median), float(low), float(high))
+
+
+def _alike(count: int) -> FloatArray:
+    return np.ones((count, count)) - np.eye(count)
+
+
+def _drawn(calibration: Calibration, random: np.random.Generator) -> tuple[IntArray, float | FloatArray, FloatArray]:
+    """Draw parameters by their likelihood: places on the grid, scales of the squares, and the grid (n, d)."""
     grid = np.stack([axis.ravel() for axis in np.meshgrid(*calibration.axes, indexing="ij")], axis=1)
     deviance, freedom = calibration.deviance.ravel() / calibration.scale, calibration.scale_freedom
     posterior = freedom + len(calibration.parameters)
     known = math.isinf(freedom)
     likelihood = np.exp(-0.5 * deviance) if known else (1.0 + deviance / freedom) ** (-0.5 * posterior)
-    random = np.random.default_rng(0)
-    mean, variance = response(grid)
     drawn = random.choice(len(grid), size=DRAWS, p=likelihood / likelihood.sum())
     scale = 1.0 if known else (freedom + deviance[drawn]) / random.chisquare(posterior, DRAWS)
-    spread = np.sqrt(variance[drawn] + scale * calibration.discrepancy**2)
-    values = mean[drawn] + spread * random.standard_normal(DRAWS)
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low, median, high = np.exp(np.quantile(values, [tail, 0.5, 1.0 - tail]))
-    return Prediction(float(median), float(low), float(high))
+    return np.asarray(drawn), scale, grid
 
 
 def advised_friction(porosity: float) -> float:
@@ -603,17 +638,17 @@ def _compared(taken: float, own: Calibration, friction: float, rival: Calibratio
     return f"the measurements do not tell a friction of {friction:g} from {taken:g}{why} ({numbers})"
 
 
-def next_cohesions(
+def next_values(
     calibration: Calibration | None, candidates: Sequence[float], visited: Sequence[float], coarse: int, most: int
 ) -> list[float]:
-    """Choose the cohesions at which to pack next.
+    """Choose the values of the first parameter at which to pack next.
 
     Parameters
     ----------
     calibration : Calibration or None
         The fit so far; None before the first.
     candidates : sequence of float
-        All that may be visited, ascending, kJ/m3.
+        All that may be visited, ascending.
     visited : sequence of float
         Those that have been.
     coarse : int
@@ -625,21 +660,19 @@ def next_cohesions(
     if calibration is None:
         picked = np.unique(np.round(np.linspace(0, values.size - 1, min(coarse, values.size))).astype(int))
         return [float(values[k]) for k in picked]
-    cohesion = calibration.estimates[0]
-    grain = float(np.diff(values).max()) if values.size > 1 else 0.0
-    wanted = [
-        float(value)
-        for value in values
-        if cohesion.low - grain <= value <= cohesion.high + grain and not np.isclose(visited, value).any()
-    ]
-    return sorted(sorted(wanted, key=lambda value: abs(value - cohesion.value))[:most])
+    first = calibration.estimates[0]
+    # the nearest candidates below and above the interval too
+    low = values[values < first.low].max(initial=values[0])
+    high = values[values > first.high].min(initial=values[-1])
+    wanted = [float(value) for value in values if low <= value <= high and not np.isclose(visited, value).any()]
+    return sorted(sorted(wanted, key=lambda value: abs(value - first.value))[:most])
 
 
 def good_enough(calibration: Calibration, relative: float) -> bool:
-    """Whether the cohesion's interval is as narrow as asked for (half-width over value), or more packings won't help.
+    """Whether the first parameter's interval is as narrow as asked for, or more packings won't help.
 
-    They do not where they make less than a tenth of the variance.
+    Its half-width is held against its value; packings do not help where they make less than a tenth of the variance.
     """
-    cohesion = calibration.estimates[0]
-    narrow = cohesion.half_width <= relative * max(cohesion.value, math.ulp(1.0))
+    first = calibration.estimates[0]
+    narrow = first.half_width <= relative * max(first.value, math.ulp(1.0))
     return narrow or calibration.model_share < 0.1

@@ -362,9 +362,9 @@ def pressure_effects(measurements: Measurements) -> dict[str, str]:
     pressed = with_pressure(measurements)
     found = {}
     for csd, fit in compressibility_by_csd(measurements).items():
-        half = _exponent_limit(fit, pressed[csd])
+        pressures = [(entry.pressure_drop or math.nan) / KILOPASCAL for entry in pressed[csd]]
+        half = exponent_limit(fit, pressures, [entry.relative_se for entry in pressed[csd]])
         if abs(fit.exponent) > half:
-            pressures = [(entry.pressure_drop or math.nan) / KILOPASCAL for entry in pressed[csd]]
             found[csd] = (
                 f"the resistance of {csd} {'rises' if fit.exponent > 0.0 else 'falls'} with pressure from "
                 f"{min(pressures):g} to {max(pressures):g} kPa (exponent {fit.exponent:.2g} ± {half:.1g})"
@@ -372,13 +372,12 @@ def pressure_effects(measurements: Measurements) -> dict[str, str]:
     return found
 
 
-def _exponent_limit(fit: CompressibilityFit, entries: Sequence[Measurement]) -> float:
-    """Half-width of the exponent's 95 % interval; of two points' by their own errors."""
+def exponent_limit(fit: CompressibilityFit, pressures: Sequence[float], errors: Sequence[float]) -> float:
+    """Half-width of the 95 % interval of a fit's exponent; of two points' by their own relative errors."""
     if math.isfinite(fit.exponent_ci95):
         return fit.exponent_ci95
-    one, other = entries
-    apart = abs(math.log((one.pressure_drop or math.nan) / (other.pressure_drop or math.nan)))
-    return quantile() * math.hypot(one.relative_se, other.relative_se) / apart
+    one, other = pressures
+    return quantile() * math.hypot(*errors) / abs(math.log(one / other))
 
 
 def with_pressure(measurements: Measurements) -> dict[str, list[Measurement]]:

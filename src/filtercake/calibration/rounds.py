@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,34 +16,39 @@ from filtercake.calibration.fit import (
     Calibration,
     Finding,
     Observation,
-    Parameter,
-    Prediction,
-    Response,
+    Slope,
     advised_friction,
+    cake_of,
     calibrate,
     compare_friction,
     good_enough,
     leave_one_out,
-    next_cohesions,
-    pooled,
-    predict,
+    next_values,
+    slope,
+    with_unit,
+    words_of,
 )
+from filtercake.calibration.measurements import exponent_limit
+from filtercake.calibration.response import Parameter, Responds, Response, SharedResponse
 from filtercake.crystals.csd import CrystalSizeDistribution, FullAndTruncated, read_tables
 from filtercake.errors import CalibrationError
-from filtercake.filtration.drum_filter import DrumFilter, area
-from filtercake.filtration.resistance import ADDITIVE, implied_porosity, resistance
-from filtercake.results.replicates import replicates_table
+from filtercake.filtration.constant_pressure import compressibility
+from filtercake.filtration.resistance import ADDITIVE, resistance
+from filtercake.packing.pack import MANIFEST
+from filtercake.packing.pack import Outcome as Packed
+from filtercake.packing.result import read_record
+from filtercake.results.replicates import REPLICATE_COLUMNS, replicate_rows, replicates_table
 from filtercake.study.points import Point
+from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MILLIJOULE_PER_M2
 
 BATCHES = 3
 """Sets of replicates that a point may get, one after the other, where the first do not suffice."""
 COARSE = 6
-"""Cohesions of the first round."""
+"""Values of the first parameter in the first round."""
 MOST = 4
-"""Cohesions added by a later one."""
-SAFETY_FACTOR = 2.0
-"""The paper's, on the predicted resistance."""
-CURVE_POINTS = 101
+"""Values added by a later one."""
+ATTRACTIONS = {"adhesion_mJ_m2": (MILLIJOULE_PER_M2, "adhesion"), "cohesion_kJ_m3": (KILOJOULE_PER_M3, "cohesion")}
+"""Units of what makes pressed crystals stick, and what a scene calls it."""
 
 
 @dataclass(frozen=True)
@@ -52,19 +58,21 @@ class Settings:
     Attributes
     ----------
     parameters : tuple of Parameter
-        The fitted ones.
-    frictions : tuple of float
-        Frictions of the packings; unless the friction is fitted, the first is the one taken, the rest its rivals.
+        The fitted ones; packings are made along the first: the cohesion of beds, the friction of pressed cakes.
+    levels : tuple of float
+        All values of the first that may be packed, ascending.
+    beside : str
+        Property held beside it: the friction of beds, the attraction of pressed cakes.
+    beside_levels : tuple of float
+        Values of that; unless it is fitted, the first is the one taken, the rest its rivals.
     measured, predicted : tuple of str
         Distributions with measurements, and those whose resistance is predicted.
-    cohesions : tuple of float
-        All that may be packed, ascending, kJ/m3.
     estimator : {"interior", "paper_count"}
         Porosity that the measured resistance is held against.
     rounds : int
         Largest number of rounds of packings.
     relative_ci95_target : float
-        Half-width of the cohesion's interval over its value that ends them.
+        Half-width of the first parameter's interval over its value that ends them.
     density, sphericity : float
         Density (kg/m3) and sphericity of the crystals.
     implied_porosity : float
@@ -75,13 +83,18 @@ class Settings:
         Doubts about the measurements.
     resistance_law : str
         Law between porosity and resistance: the study's.
+    pressures_kPa : tuple of float
+        Pressure drops at which pressed cakes are evaluated, kPa; empty for beds, which know none.
+    predicted_pressure_kPa : float or None
+        Pressure drop that pressed cakes are predicted at, kPa.
     """
 
     parameters: tuple[Parameter, ...]
-    frictions: tuple[float, ...]
+    levels: tuple[float, ...]
+    beside: str
+    beside_levels: tuple[float, ...]
     measured: tuple[str, ...]
     predicted: tuple[str, ...]
-    cohesions: tuple[float, ...]
     estimator: str
     rounds: int
     relative_ci95_target: float
@@ -91,6 +104,8 @@ class Settings:
     soft_above: float
     doubts: tuple[Finding, ...] = ()
     resistance_law: str = ADDITIVE
+    pressures_kPa: tuple[float, ...] = ()  # noqa: N815
+    predicted_pressure_kPa: float | None = None  # noqa: N815
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Settings:
@@ -107,19 +122,38 @@ class Settings:
         return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
 
     @property
-    def fits_friction(self) -> bool:
-        """Whether the friction is a fitted parameter."""
+    def first(self) -> str:
+        """Name of the parameter along which packings are made."""
+        return self.parameters[0].name
+
+    @property
+    def is_pressed(self) -> bool:
+        """Whether the packings are pressed cakes."""
+        return bool(self.pressures_kPa)
+
+    @property
+    def fits_both(self) -> bool:
+        """Whether the property held beside the first is a fitted parameter."""
         return len(self.parameters) > 1
 
     @property
-    def fixed_friction(self) -> float | None:
-        """Coefficient of friction of the fit that counts; None where it is fitted."""
-        return None if self.fits_friction else self.frictions[0]
+    def fixed(self) -> float | None:
+        """Value of that property in the fit that counts; None where it is fitted."""
+        return None if self.fits_both else self.beside_levels[0]
 
     @property
-    def main_frictions(self) -> tuple[float, ...]:
-        """Frictions of the fit that counts, without rivals."""
-        return self.frictions if self.fits_friction else self.frictions[:1]
+    def main_levels(self) -> tuple[float, ...]:
+        """Values of that property in the fit that counts, without rivals."""
+        return self.beside_levels if self.fits_both else self.beside_levels[:1]
+
+    @property
+    def predicted_cakes(self) -> tuple[Cake, ...]:
+        """Cakes to predict."""
+        return tuple((csd, self.predicted_pressure_kPa) for csd in self.predicted)
+
+
+Cake = tuple[str, float | None]
+"""A distribution, and the pressure drop in kPa where its packings know one."""
 
 
 @dataclass(frozen=True)
@@ -150,6 +184,35 @@ class Round:
 
 
 @dataclass(frozen=True)
+class Compressibility:
+    """How the resistance of a distribution's cakes changes with the pressure drop.
+
+    Attributes
+    ----------
+    csd : str
+        The distribution.
+    lowest, highest : float
+        Pressure drops between which it was measured, kPa.
+    measured, measured_ci95 : float
+        Exponent of the power law through the measured resistances, and the half-width of its 95 % interval.
+    modelled : Slope
+        Exponent of the calibrated packings, at the same pressures.
+    """
+
+    csd: str
+    lowest: float
+    highest: float
+    measured: float
+    measured_ci95: float
+    modelled: Slope
+
+    @property
+    def agree(self) -> bool:
+        """Whether the intervals of both exponents overlap."""
+        return self.modelled.low - self.measured_ci95 <= self.measured <= self.modelled.high + self.measured_ci95
+
+
+@dataclass(frozen=True)
 class Outcome:
     """A calibration with all that follows from it.
 
@@ -158,20 +221,27 @@ class Outcome:
     fit : Calibration
         The one that counts.
     rivals : dict of float to Calibration
-        Fits of the cohesion for every fixed friction, the one that counts included; empty where it is fitted.
+        Fits of the first parameter for every fixed value of the other, the one that counts included; empty where both
+        are fitted.
     left_out : dict of str to float
-        Error of predicting each distribution from the others, in ln(alpha).
+        Error of predicting each cake from those of other distributions, in ln(alpha).
     findings : tuple of Finding
         Findings about the fit.
-    responses : dict of (str, float or None) to Response
-        ln(alpha) by distribution and fixed friction (None where it is fitted).
+    responses : dict of (str, float or None) to Response or SharedResponse
+        ln(alpha) by cake and fixed value (None where it is fitted).
+    packed_correlation : float
+        Correlation of the packings' errors between cakes of one distribution.
+    compressibilities : tuple of Compressibility
+        Of the distributions that were measured at several pressures, where the packings know pressures.
     """
 
     fit: Calibration
     rivals: dict[float, Calibration]
     left_out: dict[str, float]
     findings: tuple[Finding, ...]
-    responses: dict[tuple[str, float | None], Response]
+    responses: dict[tuple[str, float | None], Responds]
+    packed_correlation: float = 0.0
+    compressibilities: tuple[Compressibility, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -210,10 +280,11 @@ def simulate(
 ) -> pd.DataFrame:
     """Tabulate every packing made, with its ln(alpha) by the estimator asked for.
 
-    The columns are those of :func:`filtercake.results.replicates.replicates_table`, batch and ln_resistance.
+    The columns are those of :func:`filtercake.results.replicates.replicates_table`, batch and ln_resistance. A pressed
+    packing has a row for each pressure and attraction that it serves.
     """
     listed = list(candidates)
-    table = replicates_table([c.point for c in listed], packings, csds, settings.sphericity, settings.resistance_law)
+    table = (_pressed_table if settings.is_pressed else _beds_table)(listed, packings, csds, settings)
     batches = {c.point.name: c.batch for c in listed}
     table["batch"] = table["point"].map(batches)
     law, material = settings.resistance_law, (settings.density, settings.sphericity)
@@ -223,6 +294,29 @@ def simulate(
         for value, csd in zip(porosity.to_list(), table["csd"], strict=True)
     ]
     return table
+
+
+def _beds_table(
+    candidates: Sequence[Candidate], packings: Path, csds: Mapping[str, FullAndTruncated], settings: Settings
+) -> pd.DataFrame:
+    points = [c.point for c in candidates]
+    return replicates_table(points, packings, csds, settings.sphericity, settings.resistance_law)
+
+
+def _pressed_table(
+    candidates: Sequence[Candidate], packings: Path, csds: Mapping[str, FullAndTruncated], settings: Settings
+) -> pd.DataFrame:
+    """Measure pressed packings at every pressure and attraction."""
+    unit, attraction = ATTRACTIONS[settings.beside]
+    rows: list[dict[str, Any]] = []
+    for point in (c.point for c in candidates):
+        outcomes = [Packed(**entry) for entry in read_record(packings / point.packings / MANIFEST)["replicates"]]
+        for pressure, value in itertools.product(settings.pressures_kPa, settings.beside_levels):
+            changed: dict[str, Any] = {"pressure": pressure * KILOPASCAL, attraction: value * unit}
+            cake = replace(point, scene=replace(point.scene, **changed))
+            folder, law = packings / point.packings, settings.resistance_law
+            rows += replicate_rows(cake, outcomes, folder, csds[point.csd], settings.sphericity, law)
+    return pd.DataFrame(rows, columns=list(REPLICATE_COLUMNS))
 
 
 def choose_round(
@@ -235,67 +329,82 @@ def choose_round(
 ) -> Round:
     """Decide what to pack in a round (numbered from 0), given the points of earlier rounds and what they gave.
 
-    The first round is coarse. Later ones refine the cohesion where the interval still is, and, when every candidate
-    there has been packed, add a batch of replicates.
+    The first round is coarse. Later ones refine the first parameter where the interval still is, and, when every
+    candidate there has been packed, add a batch of replicates.
     """
     own = [c for c in candidates if c.point.csd in settings.measured]
     if number == 0 or simulated is None:
-        first = next_cohesions(None, settings.cohesions, [], COARSE, MOST)
-        return Round(_named(own, first, settings.frictions, batch=0), finished=False, why="first look at the range")
+        values = next_values(None, settings.levels, [], COARSE, MOST)
+        names = _named(own, values, settings.beside_levels, settings, batch=0)
+        return Round(names, finished=False, why="first look at the range")
     fit = fit_main(settings, observations, simulated)
-    cohesion = fit.estimates[0]
-    so_far = f"cohesion {cohesion.value:.3g} kJ/m3, 95 % interval {cohesion.low:.3g} to {cohesion.high:.3g}"
+    found = fit.estimates[0]
+    value, low, high = (f"{end:.3g}" for end in (found.value, found.low, found.high))
+    name = words_of(settings.first).removesuffix(" energy density").removeprefix("coefficient of ")
+    so_far = f"{name} {with_unit(settings.first, value)}, 95 % interval {low} to {high}"
     if good_enough(fit, settings.relative_ci95_target):
         return Round((), finished=True, why=f"{so_far}: {_enough(fit, settings.relative_ci95_target)}")
     if number >= settings.rounds:
         return Round((), finished=True, why=f"{so_far}: the last of {settings.rounds} rounds")
-    seen = sorted({_cohesion(c) for c in own if c.point.name in visited})
-    wanted = next_cohesions(fit, settings.cohesions, seen, COARSE, MOST)
+    seen = sorted({_level(c, settings) for c in own if c.point.name in visited})
+    wanted = next_values(fit, settings.levels, seen, COARSE, MOST)
     if wanted:
-        why = f"{so_far}: look closer at {', '.join(f'{value:g}' for value in wanted)} kJ/m3"
-        return Round(_named(own, wanted, settings.main_frictions, batch=0), finished=False, why=why)
-    near = next_cohesions(fit, settings.cohesions, [], COARSE, len(settings.cohesions))
+        why = f"{so_far}: look closer at {_listed(wanted, settings)}"
+        names = _named(own, wanted, settings.main_levels, settings, batch=0)
+        return Round(names, finished=False, why=why)
+    near = next_values(fit, settings.levels, [], COARSE, len(settings.levels))
     for batch in range(1, BATCHES):
-        points = tuple(name for name in _named(own, near, settings.main_frictions, batch) if name not in visited)
+        every = _named(own, near, settings.main_levels, settings, batch)
+        points = tuple(name for name in every if name not in visited)
         if points:
-            why = f"{so_far}: more replicates at {', '.join(f'{value:g}' for value in near)} kJ/m3"
+            why = f"{so_far}: more replicates at {_listed(near, settings)}"
             return Round(points, finished=False, why=why)
     return Round((), finished=True, why=f"{so_far}: every candidate has its {BATCHES} batches")
 
 
+def _listed(values: Sequence[float], settings: Settings) -> str:
+    return with_unit(settings.first, ", ".join(f"{value:g}" for value in values))
+
+
 def _enough(fit: Calibration, target: float) -> str:
-    cohesion = fit.estimates[0]
-    if cohesion.half_width <= target * cohesion.value:
+    first = fit.estimates[0]
+    if first.half_width <= target * first.value:
         return f"within {100.0 * target:g} %"
     return f"more packings would not narrow it, they make {100.0 * fit.model_share:.0f} % of the variance"
 
 
 def _named(
-    candidates: Sequence[Candidate], cohesions: Sequence[float], frictions: Sequence[float], batch: int
+    candidates: Sequence[Candidate],
+    levels: Sequence[float],
+    beside: Sequence[float],
+    settings: Settings,
+    batch: int,
 ) -> tuple[str, ...]:
+    """Name the points at some values of the first parameter and of what is held beside it; all serve pressed cakes."""
     return tuple(
         c.point.name
         for c in candidates
         if c.batch == batch
-        and np.isclose(cohesions, _cohesion(c)).any()
-        and np.isclose(frictions, c.point.scene.friction).any()
+        and np.isclose(levels, _level(c, settings)).any()
+        and (settings.is_pressed or np.isclose(beside, c.point.row()[settings.beside]).any())
     )
 
 
-def _cohesion(candidate: Candidate) -> float:
-    return float(candidate.point.row()["cohesion_kJ_m3"])
+def _level(candidate: Candidate, settings: Settings) -> float:
+    """Value of the first parameter."""
+    return float(candidate.point.row()[settings.first])
 
 
 def prediction_points(settings: Settings, candidates: Sequence[Candidate], fit: Calibration) -> tuple[str, ...]:
     """Points at which the distributions to predict are packed: those that the interval spans, and their neighbours."""
-    near = next_cohesions(fit, settings.cohesions, [], COARSE, len(settings.cohesions))
-    values = list(settings.cohesions)
+    near = next_values(fit, settings.levels, [], COARSE, len(settings.levels))
+    values = list(settings.levels)
     while len(near) < min(4, len(values)):  # a curve needs more than two points
         near = sorted({*near, *(values[k] for k in _beside(values, near))})
     if len(near) > COARSE:
         near = [near[k] for k in np.unique(np.round(np.linspace(0, len(near) - 1, COARSE)).astype(int))]
     own = [c for c in candidates if c.point.csd in settings.predicted]
-    return _named(own, near, settings.main_frictions, batch=0)
+    return _named(own, near, settings.main_levels, settings, batch=0)
 
 
 def _beside(values: Sequence[float], near: Sequence[float]) -> set[int]:
@@ -304,26 +413,68 @@ def _beside(values: Sequence[float], near: Sequence[float]) -> set[int]:
 
 
 def responses_at(
-    settings: Settings, simulated: pd.DataFrame, names: Iterable[str], friction: float | None
-) -> dict[str, Response]:
-    """Smooth models of ln(alpha) by distribution, at one friction or (None) over cohesion and friction.
+    settings: Settings, simulated: pd.DataFrame, cakes: Iterable[Cake], beside: float | None
+) -> dict[str, Responds]:
+    """Smooth models of ln(alpha) by cake, at one value of what is held beside the first parameter or (None) over both.
 
-    Distributions without enough accepted packings are left out.
+    Cakes without enough accepted packings are left out.
     """
-    columns = [parameter.name for parameter in settings.parameters]
-    parameters = settings.parameters if friction is None else settings.parameters[:1]
     good = simulated[simulated["status"] == "ok"]
-    if friction is not None:
-        good = good[np.isclose(good["friction"], friction)]
-    found = {}
-    for name in names:
-        groups = good[good["csd"] == name].groupby(columns[: len(parameters)])["ln_resistance"]
-        samples = [(key, values.to_numpy(np.float64)) for key, values in groups]
-        if len(samples) >= 3 and any(values.size > 1 for _, values in samples):
-            found[name] = Response(
-                parameters, np.array([key for key, _ in samples], dtype=np.float64), [values for _, values in samples]
-            )
-    return found
+    found = {cake_of(*cake): _responds(settings, _of_cake(good, *cake), beside) for cake in cakes}
+    return {name: response for name, response in found.items() if response is not None}
+
+
+def _responds(settings: Settings, rows: pd.DataFrame, beside: float | None) -> Responds | None:
+    if beside is None and not settings.is_pressed:
+        return _response(settings.parameters, rows)
+    levels = settings.beside_levels if beside is None else (beside,)
+    parts = [_response(settings.parameters[:1], rows[np.isclose(rows[settings.beside], at)]) for at in levels]
+    along = [part for part in parts if part is not None]
+    if len(along) < len(levels):
+        return None
+    if beside is not None:
+        return along[0]
+    return SharedResponse((settings.parameters[0], settings.parameters[1]), levels, along)
+
+
+def _of_cake(rows: pd.DataFrame, csd: str, pressure: float | None) -> pd.DataFrame:
+    own = rows[rows["csd"] == csd]
+    return own if pressure is None else own[np.isclose(own["pressure_kPa"], pressure)]
+
+
+def _response(parameters: Sequence[Parameter], rows: pd.DataFrame) -> Response | None:
+    """Smooth model of accepted packings over some parameters; None where they are too few."""
+    groups = rows.groupby([parameter.name for parameter in parameters])["ln_resistance"]
+    samples = [(key, values.to_numpy(np.float64)) for key, values in groups]
+    if len(samples) < 3 or not any(values.size > 1 for _, values in samples):
+        return None
+    return Response(
+        parameters, np.array([key for key, _ in samples], dtype=np.float64), [values for _, values in samples]
+    )
+
+
+def measured_cakes(observations: Sequence[Observation]) -> tuple[Cake, ...]:
+    """List the cakes that were measured, each once."""
+    return tuple(dict.fromkeys((item.csd, item.pressure_kPa) for item in observations))
+
+
+def packed_correlation(settings: Settings, simulated: pd.DataFrame) -> float:
+    """Correlation of one packing's ln(alpha) between the pressures that it was evaluated at, 0 to 1.
+
+    Pooled over distributions and frictions, about their means, at one attraction; 0 where there is one pressure or
+    none.
+    """
+    if len(settings.pressures_kPa) < 2:
+        return 0.0
+    rows = simulated[simulated["status"] == "ok"]
+    rows = rows[np.isclose(rows[settings.beside], settings.beside_levels[-1])]
+    who = ["csd", settings.first]
+    wide = rows.pivot_table(index=[*who, "batch", "replicate"], columns="pressure_kPa", values="ln_resistance")
+    apart = (wide - wide.groupby(level=who).transform("mean")).dropna()
+    matrix = np.corrcoef(apart.to_numpy(np.float64).T)
+    pairs = matrix[np.triu_indices_from(matrix, 1)]
+    mean = float(np.mean(pairs[np.isfinite(pairs)])) if np.isfinite(pairs).any() else 1.0
+    return min(max(mean, 0.0), 1.0)
 
 
 def fit_main(settings: Settings, observations: Sequence[Observation], simulated: pd.DataFrame) -> Calibration:
@@ -334,30 +485,36 @@ def fit_main(settings: Settings, observations: Sequence[Observation], simulated:
     CalibrationError
         If a measured distribution has not enough packings.
     """
-    return calibrate(observations, _main_responses(settings, simulated))
+    responses = _main_responses(settings, observations, simulated)
+    return calibrate(observations, responses, packed_correlation(settings, simulated))
 
 
-def _main_responses(settings: Settings, simulated: pd.DataFrame) -> dict[str, Response]:
-    friction = settings.fixed_friction
-    responses = responses_at(settings, simulated, settings.measured, friction)
-    shortage = _shortage(settings.measured, responses, simulated, friction)
+def _main_responses(
+    settings: Settings, observations: Sequence[Observation], simulated: pd.DataFrame
+) -> dict[str, Responds]:
+    cakes = measured_cakes(observations)
+    responses = responses_at(settings, simulated, cakes, settings.fixed)
+    shortage = shortage_of(cakes, responses, simulated, settings, settings.fixed)
     if shortage:
         raise CalibrationError(f"not enough accepted packings for a fit: {shortage}")
     return responses
 
 
-def _shortage(
-    wanted: Sequence[str], found: Mapping[str, Response], simulated: pd.DataFrame, friction: float | None
+def shortage_of(
+    wanted: Sequence[Cake],
+    found: Mapping[str, Responds],
+    simulated: pd.DataFrame,
+    settings: Settings,
+    beside: float | None,
 ) -> str:
     """Distributions with too few accepted packings for a smooth model, in words; empty if none."""
-    rows = simulated if friction is None else simulated[np.isclose(simulated["friction"], friction)]
+    rows = simulated if beside is None else simulated[np.isclose(simulated[settings.beside], beside)]
+    names = [settings.first] if settings.is_pressed else [settings.first, settings.beside]
     counts = []
-    for name in [name for name in wanted if name not in found]:
-        own = rows[rows["csd"] == name]
-        made, good = (
-            len(part[["cohesion_kJ_m3", "friction"]].drop_duplicates()) for part in (own, own[own["status"] == "ok"])
-        )
-        counts.append(f"{name} has them at {good} of {made} points")
+    for csd in dict.fromkeys(csd for csd, pressure in wanted if cake_of(csd, pressure) not in found):
+        own = rows[rows["csd"] == csd]
+        made, good = (len(part[names].drop_duplicates()) for part in (own, own[own["status"] == "ok"]))
+        counts.append(f"{csd} has them at {good} of {made} points")
     return f"{', '.join(counts)}; at least 3 are needed, one of them with two packings" if counts else ""
 
 
@@ -369,61 +526,104 @@ def conclude(settings: Settings, observations: Sequence[Observation], simulated:
     CalibrationError
         If a measured distribution has not enough packings.
     """
-    main = _main_responses(settings, simulated)
-    fit = calibrate(observations, main)
-    by_friction: dict[float | None, dict[str, Response]] = {settings.fixed_friction: main}
-    rivals = {} if settings.fits_friction else {settings.frictions[0]: fit}
+    main = _main_responses(settings, observations, simulated)
+    correlation = packed_correlation(settings, simulated)
+    fit = calibrate(observations, main, correlation)
+    by_level: dict[float | None, dict[str, Responds]] = {settings.fixed: main}
+    rivals = {} if settings.fits_both else {settings.beside_levels[0]: fit}
     skipped = []
-    for mu in () if settings.fits_friction else settings.frictions[1:]:
-        responses = by_friction[mu] = responses_at(settings, simulated, settings.measured, mu)
-        shortage = _shortage(settings.measured, responses, simulated, mu)
+    cakes = measured_cakes(observations)
+    for mu in () if settings.fits_both else settings.beside_levels[1:]:
+        responses = by_level[mu] = responses_at(settings, simulated, cakes, mu)
+        shortage = shortage_of(cakes, responses, simulated, settings, mu)
         if shortage:
             skipped.append(
                 Finding("friction", f"a friction of {mu:g} is not compared, for want of accepted packings: {shortage}")
             )
         else:
             rivals[mu] = calibrate(observations, responses)
-    compared = compare_friction(rivals) if rivals else ()
-    friction = (*compared, *skipped, *_untested(settings), *_advice(settings, fit))
+    compressibilities = tuple(_compressibilities(observations, fit, main, correlation))
+    compared = compare_friction(rivals) if len(rivals) > 1 else ()
+    friction = (*compared, *skipped, *_untested(settings), *_advice(settings))
     return Outcome(
         fit=fit,
         rivals=rivals,
-        left_out=leave_one_out(observations, main),
-        findings=(*settings.doubts, *_explained(settings, fit, simulated), *friction, *_soft(settings, fit)),
-        responses={(name, mu): r for mu, responses in by_friction.items() for name, r in responses.items()},
+        left_out=leave_one_out(observations, main, correlation),
+        findings=(
+            *settings.doubts,
+            *_explained(settings, fit, simulated),
+            *friction,
+            *_soft(settings, fit),
+            *_pressed_apart(compressibilities),
+        ),
+        responses={(name, mu): r for mu, responses in by_level.items() for name, r in responses.items()},
+        packed_correlation=correlation,
+        compressibilities=compressibilities,
     )
+
+
+def _compressibilities(
+    observations: Sequence[Observation], fit: Calibration, responses: Mapping[str, Responds], correlation: float
+) -> Iterable[Compressibility]:
+    """Compare measured and modelled exponents of the distributions that were measured at several pressures."""
+    for csd in dict.fromkeys(item.csd for item in observations):
+        own = [item for item in observations if item.csd == csd]
+        drops = sorted({item.pressure_kPa for item in own if item.pressure_kPa is not None})
+        if len(drops) < 2:
+            continue
+        modelled = slope(fit, np.log(drops), [responses[cake_of(csd, drop)] for drop in drops], correlation)
+        pressures, errors = [item.pressure_kPa or math.nan for item in own], [item.standard_error for item in own]
+        law = compressibility(pressures, [math.exp(item.ln_resistance) for item in own], errors)
+        half = exponent_limit(law, pressures, errors)
+        yield Compressibility(csd, drops[0], drops[-1], law.exponent, half, modelled)
+
+
+def _pressed_apart(found: Iterable[Compressibility]) -> Iterable[Finding]:
+    """Say which measured cakes change with pressure otherwise than pressed spheres do."""
+    for item in found:
+        if item.agree:
+            continue
+        more = item.measured > item.modelled.value
+        why = "crystals that break, bend or are no spheres do" if more else "nothing in the packings explains that"
+        yield Finding(
+            "pressure",
+            f"the resistance of {item.csd} rises {'faster' if more else 'more slowly'} with pressure than that of the "
+            f"calibrated packings (exponent {item.measured:.2g} ± {item.measured_ci95:.1g} measured, "
+            f"{item.modelled.value:.2g} from {item.modelled.low:.2g} to {item.modelled.high:.2g} packed): {why}",
+        )
 
 
 def _explained(settings: Settings, fit: Calibration, simulated: pd.DataFrame) -> tuple[Finding, ...]:
     """Return the findings of the fit, but for what points without accepted packings explain; those are named instead.
 
-    Outside the cohesions that were packed, only the smooth model's guess keeps a cohesion in or out of the interval:
-    what is not known there is no fault of the measurements.
+    Outside the values that were packed, only the smooth model's guess keeps a value in or out of the interval: what is
+    not known there is no fault of the measurements.
     """
+    first = settings.first
     rows = simulated[simulated["csd"].isin(settings.measured)]
-    if not settings.fits_friction:
-        rows = rows[np.isclose(rows["friction"], settings.frictions[0])]
+    if not settings.fits_both:
+        rows = rows[np.isclose(rows[settings.beside], settings.beside_levels[0])]
     good = rows[rows["status"] == "ok"]
-    points = ["csd", "cohesion_kJ_m3"]
+    points = ["csd", first]
     failed = sorted(
         set(rows[points].itertuples(index=False, name=None)) - set(good[points].itertuples(index=False, name=None))
     )
     if not failed:
         return fit.findings
-    packed = good.groupby("csd")["cohesion_kJ_m3"]
+    packed = good.groupby("csd")[first]
     lowest, highest = float(packed.min().max()), float(packed.max().min())
     below = any(value < lowest for _, value in failed) and fit.estimates[0].low < lowest
     above = any(value > highest for _, value in failed) and fit.estimates[0].high > highest
     names = ", ".join(
-        f"{csd} at {', '.join(f'{value:g}' for name, value in failed if name == csd)} kJ/m3"
+        f"{csd} at {_listed([value for name, value in failed if name == csd], settings)}"
         for csd in dict.fromkeys(name for name, _ in failed)
     )
     text = f"no packing was accepted of {names} (column reason of replicates.csv)"
     if below or above:
         where = " and ".join([f"below {lowest:g}"] * below + [f"above {highest:g}"] * above)
         text += (
-            f": {where} kJ/m3 the interval is the smooth model's guess, not what the measurements say; make these "
-            "packings possible (make retry, or the study's packing settings)"
+            f": {with_unit(first, where)} the interval is the smooth model's guess, not what the measurements say; "
+            "make these packings possible (make retry, or the study's packing settings)"
         )
     explained = {"several", "flat"} if below or above else set()
     kept = [
@@ -437,18 +637,17 @@ def _explained(settings: Settings, fit: Calibration, simulated: pd.DataFrame) ->
 
 
 def _untested(settings: Settings) -> tuple[Finding, ...]:
-    """Return the finding that the measurements cannot test the friction, where they cannot."""
-    if len(settings.measured) > 1 or len(settings.frictions) > 1:
+    """Return the finding that the measurements cannot test the friction taken, where they cannot."""
+    if settings.is_pressed or len(settings.measured) > 1 or len(settings.beside_levels) > 1:
         return ()
-    text = f"one measured distribution cannot test the friction taken, {settings.frictions[0]:g}: a cohesion makes up"
-    return (Finding("friction", f"{text} for another one"),)
+    text = f"one measured distribution cannot test the friction taken, {settings.beside_levels[0]:g}: a cohesion makes"
+    return (Finding("friction", f"{text} up for another one"),)
 
 
-def _advice(settings: Settings, fit: Calibration) -> tuple[Finding, ...]:
+def _advice(settings: Settings) -> tuple[Finding, ...]:
     """Return the finding that the friction taken is not the one the paper advises, where it is not."""
-    advised = advised_friction(settings.implied_porosity)
-    taken = fit.best[1] if settings.fits_friction else settings.frictions[0]
-    if settings.fits_friction or np.isclose(taken, advised):
+    advised, taken = advised_friction(settings.implied_porosity), settings.beside_levels[0]
+    if settings.is_pressed or settings.fits_both or np.isclose(taken, advised):
         return ()
     text = (
         f"the friction taken is {taken:g}; for the porosity that the measurements imply "
@@ -466,168 +665,3 @@ def _soft(settings: Settings, fit: Calibration) -> tuple[Finding, ...]:
         "takes part in the answer; use a larger Young's modulus"
     )
     return (Finding("soft", text),)
-
-
-def summary(outcome: Outcome, settings: Settings, why: str) -> dict[str, Any]:
-    """Return the outcome as plain values, fit for JSON."""
-    fit = outcome.fit
-    return {
-        "parameters": {
-            e.parameter.name: {"value": e.value, "low": e.low, "high": e.high, "regions": e.regions}
-            for e in fit.estimates
-        },
-        "friction": settings.fixed_friction,
-        "threshold": fit.threshold,
-        "scale_freedom": fit.scale_freedom if math.isfinite(fit.scale_freedom) else None,
-        "chi_square": fit.chi_square,
-        "degrees_of_freedom": fit.degrees_of_freedom,
-        "discrepancy": fit.discrepancy,
-        "share_of_packings_in_variance": fit.model_share,
-        "implied_porosity": settings.implied_porosity,
-        "resistance_law": settings.resistance_law,
-        "estimator": settings.estimator,
-        "ended": why,
-        "findings": [asdict(finding) for finding in outcome.findings],
-        "rivals": {
-            f"{mu:g}": {
-                "chi_square": rival.chi_square,
-                "cohesion_kJ_m3": rival.best[0],
-                "low": rival.estimates[0].low,
-                "high": rival.estimates[0].high,
-            }
-            for mu, rival in outcome.rivals.items()
-        },
-    }
-
-
-def parity_table(outcome: Outcome, settings: Settings, observations: Sequence[Observation]) -> pd.DataFrame:
-    """Tabulate measured against modelled resistances at the calibrated parameters, one row per measurement.
-
-    ``relative_uncertainty`` is as the fit takes it: with the scatter of measurements that contradict each other.
-    ``left_out_m_kg`` is the resistance that the other distributions predict for this one; ``left_out_ln_error`` its
-    error, in ln(alpha), against the weighted mean of the distribution's measurements. ``scatter_freedom`` are the
-    degrees of freedom of that scatter; blank where the errors are known.
-    """
-    friction = settings.fixed_friction
-    means = pooled(observations)
-    rows = []
-    for item in observations:
-        response = outcome.responses[item.csd, friction]
-        mean, variance = response(np.array([outcome.fit.best]))
-        whole = predict(outcome.fit, response)
-        rows.append(
-            {
-                "measurement": item.name,
-                "csd": item.csd,
-                "measured_m_kg": math.exp(item.ln_resistance),
-                "relative_uncertainty": math.hypot(item.standard_error, means[item.csd].scatter),
-                "scatter_freedom": freedom if math.isfinite(freedom := means[item.csd].freedom) else math.nan,
-                "modelled_m_kg": math.exp(float(mean[0])),
-                "modelled_low_m_kg": whole.low,
-                "modelled_high_m_kg": whole.high,
-                "packings_relative_error": math.sqrt(float(variance[0])),
-                "left_out_m_kg": math.exp(means[item.csd].mean + outcome.left_out[item.csd])
-                if item.csd in outcome.left_out
-                else math.nan,
-                "left_out_ln_error": outcome.left_out.get(item.csd, math.nan),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def objective_table(outcome: Outcome, settings: Settings) -> pd.DataFrame:
-    """Tabulate the objective: cohesion_kJ_m3, friction, deviance; for every fixed friction, or over both."""
-    parts = []
-    if settings.fits_friction:
-        cohesion, friction = np.meshgrid(*outcome.fit.axes, indexing="ij")
-        columns = {"cohesion_kJ_m3": cohesion.ravel(), "friction": friction.ravel()}
-        return pd.DataFrame({**columns, "deviance": outcome.fit.deviance.ravel()})
-    for mu, fit in outcome.rivals.items():
-        parts.append(pd.DataFrame({"cohesion_kJ_m3": fit.axes[0], "friction": mu, "deviance": fit.deviance}))
-    return pd.concat(parts, ignore_index=True)
-
-
-def response_table(outcome: Outcome, settings: Settings) -> pd.DataFrame:
-    """Tabulate the smooth models: csd, friction, cohesion_kJ_m3, resistance_m_kg and its relative standard error."""
-    cohesion = settings.parameters[0]
-    values = np.linspace(cohesion.low, cohesion.high, CURVE_POINTS)
-    parts = []
-    for (name, mu), response in outcome.responses.items():
-        at = outcome.fit.best[1] if mu is None else mu
-        points = values[:, None] if mu is not None else np.column_stack([values, np.full(values.size, at)])
-        mean, variance = response(points)
-        parts.append(
-            pd.DataFrame(
-                {
-                    "csd": name,
-                    "friction": at,
-                    "cohesion_kJ_m3": values,
-                    "resistance_m_kg": np.exp(mean),
-                    "relative_error": np.sqrt(variance),
-                }
-            )
-        )
-    return pd.concat(parts, ignore_index=True)
-
-
-def prediction_table(
-    outcome: Outcome,
-    settings: Settings,
-    simulated: pd.DataFrame,
-    csds: Mapping[str, CrystalSizeDistribution],
-    drum: DrumFilter | None = None,
-    slurry_flow: float = 0.0,
-) -> pd.DataFrame:
-    """Predict the distributions never tested, with the safety factor of the paper beside the interval's upper end.
-
-    Parameters
-    ----------
-    outcome, settings : Outcome, Settings
-        The calibration.
-    simulated : DataFrame
-        Packings of the distributions to predict (see :func:`simulate`).
-    csds : mapping of str to CrystalSizeDistribution
-        The full distributions.
-    drum, slurry_flow : DrumFilter or None, float
-        Filter whose area is wanted, and the slurry that it must take, m3/s.
-
-    Raises
-    ------
-    CalibrationError
-        If a distribution has not enough packings.
-    """
-    friction = settings.fixed_friction
-    responses = responses_at(settings, simulated, settings.predicted, friction)
-    shortage = _shortage(settings.predicted, responses, simulated, friction)
-    if shortage:
-        raise CalibrationError(f"not enough accepted packings for a prediction: {shortage}")
-    return pd.DataFrame(
-        [
-            _prediction_row(name, predict(outcome.fit, responses[name]), csds[name], settings, drum, slurry_flow)
-            for name in settings.predicted
-        ]
-    )
-
-
-def _prediction_row(
-    name: str,
-    found: Prediction,
-    csd: CrystalSizeDistribution,
-    settings: Settings,
-    drum: DrumFilter | None,
-    slurry_flow: float,
-) -> dict[str, Any]:
-    ends = (found.resistance, found.low, found.high)
-    row: dict[str, Any] = {"csd": name}
-    row.update(zip(("resistance_m_kg", "resistance_low_m_kg", "resistance_high_m_kg"), ends, strict=True))
-    # the porosity falls as the resistance rises: its ends change places
-    material = (settings.density, settings.sphericity, settings.resistance_law)
-    porosities = [implied_porosity(alpha, csd, *material) for alpha in ends]
-    row.update(zip(("porosity", "porosity_high", "porosity_low"), porosities, strict=True))
-    row["high_over_resistance"] = found.high / found.resistance
-    row["resistance_with_safety_factor_m_kg"] = SAFETY_FACTOR * found.resistance
-    if drum is not None:
-        areas = area(drum, np.array([*ends, SAFETY_FACTOR * found.resistance]), slurry_flow)
-        names = ("filter_area_m2", "filter_area_low_m2", "filter_area_high_m2", "filter_area_with_safety_factor_m2")
-        row.update(zip(names, (float(value) for value in areas), strict=True))
-    return row

@@ -1,4 +1,4 @@
-"""Deviance of each cohesion (and friction) from the measurements, and the findings about the fit."""
+"""Deviance of each value of the fitted properties from the measurements, and the findings about the fit."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ LINE_HEIGHT = 0.135
 
 
 def draw(data: CalibrationData) -> Figure:
-    """Draw the deviance against the cohesion, or over cohesion and friction, with the 95 % interval or region."""
+    """Draw the deviance against the fitted property, or over both, with the 95 % interval or region."""
     findings = _findings(data)
-    height = 4.3 if data.fits_friction else 3.9
+    height = 4.3 if data.fits_both else 3.9
     figure, (axes,) = style.panels(width=style.MEDIUM, height=height + LINE_HEIGHT * len(findings))
     axes.set_title(calibrated.panel_title(data, 75), loc="left")
-    axes.set_xlabel(style.COHESION)
-    (_contours if data.fits_friction else _curves)(axes, data)
+    axes.set_xlabel(style.AXES[data.axis])
+    (_contours if data.fits_both else _curves)(axes, data)
     style.legend(figure, [axes], columns=1)
     _say(axes, findings)
     rows = calibrated.fitted_packings(data, rivals=True)
@@ -45,36 +45,35 @@ def draw(data: CalibrationData) -> Figure:
 
 
 def _curves(axes: Axes, data: CalibrationData) -> None:
-    frictions = data.objective["friction"].to_numpy(np.float64)
+    beside = data.objective[data.beside].to_numpy(np.float64)
     # the one taken is in front of its rivals, and the first of the legend
-    ranked = sorted(dict.fromkeys(frictions.tolist()), key=lambda mu: not np.isclose(mu, data.friction))
-    for index, mu in enumerate(ranked):
-        rows = data.objective[np.isclose(frictions, mu)]
-        cohesion, deviance = (rows[name].to_numpy(np.float64) for name in ("cohesion_kJ_m3", "deviance"))
+    ranked = sorted(dict.fromkeys(beside.tolist()), key=lambda level: not np.isclose(level, data.held))
+    for index, level in enumerate(ranked):
+        rows = data.objective[np.isclose(beside, level)]
+        along, deviance = (rows[name].to_numpy(np.float64) for name in (data.axis, "deviance"))
         main, ink = index == 0, style.colour(index)
         axes.plot(
-            cohesion,
+            along,
             deviance,
             color=ink,
             linewidth=1.6 if main else 1.0,
             linestyle="-" if main else (0, (5, 1.5)),
-            label=_label(data, mu),
+            label=_label(data, level),
             zorder=3.0 - 0.1 * index,
             gid="deviance",
         )
         if not main:
-            best = data.summary["rivals"][f"{mu:g}"]["cohesion_kJ_m3"]
+            best = data.summary["rivals"][f"{level:g}"][data.axis]
             axes.plot([best], [0.0], style.marker(index), color=ink, clip_on=False, zorder=4, gid="rival")
-    words = calibrated.with_interval(*data.cohesion, unit=" kJ/m³")
     axes.plot(
-        [data.cohesion[0]],
+        [data.found[0]],
         [0.0],
         style.marker(0),
         color=style.colour(0),
         markeredgecolor=style.INK,
         markersize=6.0,
         clip_on=False,
-        label=f"best cohesion: {words}",
+        label=f"best {calibrated.found_words(data, data.axis)}",
         zorder=5,
         gid="best",
     )
@@ -90,28 +89,28 @@ def _curves(axes: Axes, data: CalibrationData) -> None:
     )
     highest = float(data.objective["deviance"].max())
     axes.set_ylim(0.0, max(min(max(1.05 * highest, LEAST_HEIGHT), MOST_HEIGHT), ABOVE * threshold))
-    axes.set_xlim(float(data.objective["cohesion_kJ_m3"].min()), float(data.objective["cohesion_kJ_m3"].max()))
+    axes.set_xlim(float(data.objective[data.axis].min()), float(data.objective[data.axis].max()))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.set_ylabel(DEVIANCE)
 
 
-def _label(data: CalibrationData, mu: float) -> str:
+def _label(data: CalibrationData, level: float) -> str:
     rivals = data.summary["rivals"]
-    chosen = " (taken)" if len(rivals) > 1 and np.isclose(mu, data.friction) else ""
-    return f"friction {mu:g}{chosen}: χ² = {rivals[f'{mu:g}']['chi_square']:.1f}"
+    chosen = " (taken)" if len(rivals) > 1 and np.isclose(level, data.held) else ""
+    return f"{calibrated.held_words(data, level)}{chosen}: χ² = {rivals[f'{level:g}']['chi_square']:.1f}"
 
 
 def _squares(data: CalibrationData) -> str:
     freedom = max(data.summary["degrees_of_freedom"], 0)
-    value = f"χ² = {data.summary['chi_square']:.1f}" if data.fits_friction else "χ²"
+    value = f"χ² = {data.summary['chi_square']:.1f}" if data.fits_both else "χ²"
     return f"{value} with {freedom or 'no'} degree{'s' if freedom > 1 else ''} of freedom"
 
 
 def _interval(axes: Axes, data: CalibrationData) -> None:
-    """Shade the cohesions in the 95 % interval, each of its stretches on its own."""
-    rows = data.objective[np.isclose(data.objective["friction"], data.friction)]
-    cohesion, deviance = (rows[name].to_numpy(np.float64) for name in ("cohesion_kJ_m3", "deviance"))
-    ends = stretches(cohesion, deviance, float(data.summary["threshold"]))
+    """Shade the values in the 95 % interval, each of its stretches on its own."""
+    rows = data.objective[np.isclose(data.objective[data.beside], data.held)]
+    along, deviance = (rows[name].to_numpy(np.float64) for name in (data.axis, "deviance"))
+    ends = stretches(along, deviance, float(data.summary["threshold"]))
     look: dict[str, Any] = {"color": style.colour(0), "alpha": 0.13, "linewidth": 0.0, "zorder": 0}
     for low, high in ends:
         axes.axvspan(low, high, label="95 % interval", gid="interval", **look)
@@ -133,7 +132,7 @@ def stretches(values: FloatArray, deviance: FloatArray, threshold: float) -> lis
 
 
 def _contours(axes: Axes, data: CalibrationData) -> None:
-    table = data.objective.pivot(index="friction", columns="cohesion_kJ_m3", values="deviance")
+    table = data.objective.pivot(index=data.beside, columns=data.axis, values="deviance")
     grid = (table.columns.to_numpy(np.float64), table.index.to_numpy(np.float64), table.to_numpy(np.float64))
     threshold = float(data.summary["threshold"])
     filled = axes.contourf(*grid, levels=sorted({*LEVELS, threshold}), cmap="Blues", extend="max")
@@ -144,30 +143,29 @@ def _contours(axes: Axes, data: CalibrationData) -> None:
         axes.plot(
             [], [], color=style.INK, linewidth=1.1, label=f"95 % region of one parameter (deviance {threshold:.3g})"
         )
-    cohesion, friction = data.cohesion, data.estimate("friction")
-    _edges(axes, cohesion, friction)
+    along, beside = data.found, data.estimate(data.beside)
+    _edges(axes, along, beside)
     axes.plot(
-        [cohesion[0]],
-        [friction[0]],
+        [along[0]],
+        [beside[0]],
         style.marker(0),
         color=style.colour(1),
         markeredgecolor=style.INK,
         markersize=6.0,
         clip_on=False,
-        label=f"best: cohesion {calibrated.with_interval(*cohesion, unit=' kJ/m³')},\n"
-        f"friction {calibrated.with_interval(*friction)}",
+        label=f"best: {calibrated.found_words(data, data.axis)},\n{calibrated.found_words(data, data.beside)}",
         zorder=5,
         gid="best",
     )
-    axes.set_ylabel("Coefficient of friction (–)")
+    axes.set_ylabel(style.AXES[data.beside])
 
 
-def _edges(axes: Axes, cohesion: tuple[float, float, float], friction: tuple[float, float, float]) -> None:
+def _edges(axes: Axes, along: tuple[float, float, float], beside: tuple[float, float, float]) -> None:
     """Draw the 95 % intervals of both parameters along the axes."""
     look: dict[str, Any] = {"color": style.colour(1), "linewidth": 3.0, "solid_capstyle": "butt", "clip_on": False}
     look |= {"zorder": 4, "gid": "interval"}
-    axes.plot(cohesion[1:], [0.0, 0.0], transform=axes.get_xaxis_transform(), label="95 % intervals", **look)
-    axes.plot([0.0, 0.0], friction[1:], transform=axes.get_yaxis_transform(), **look)
+    axes.plot(along[1:], [0.0, 0.0], transform=axes.get_xaxis_transform(), label="95 % intervals", **look)
+    axes.plot([0.0, 0.0], beside[1:], transform=axes.get_yaxis_transform(), **look)
 
 
 def _findings(data: CalibrationData) -> list[str]:
@@ -175,7 +173,7 @@ def _findings(data: CalibrationData) -> list[str]:
     lines = []
     for finding in data.summary["findings"]:
         sentence = f"• {finding['text'][:1].upper()}{finding['text'][1:]}."
-        lines += textwrap.wrap(sentence, CHARACTERS[data.fits_friction], subsequent_indent="   ")
+        lines += textwrap.wrap(sentence, CHARACTERS[data.fits_both], subsequent_indent="   ")
     return lines
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from filtercake.calibration.rounds import Cake
 from filtercake.figures import calibrated, style
 from filtercake.figures.calibrated import CalibrationData
 from filtercake.units import FloatArray
@@ -23,10 +24,10 @@ ENTRY_HEIGHT = 0.13
 def draw(data: CalibrationData) -> Figure:
     """Draw every measurement, with the 95 % intervals of both sides."""
     # the axes are nearly square; matplotlib's layout does not keep the labels of exactly square ones apart
-    figure, (axes,) = style.panels(width=style.SINGLE, height=4.2 + ENTRY_HEIGHT * (len(data.measured) + 2))
+    figure, (axes,) = style.panels(width=style.SINGLE, height=4.2 + ENTRY_HEIGHT * (len(data.cakes) + 2))
     axes.set_title(calibrated.panel_title(data, 45), loc="left")
-    for csd in data.measured:
-        _distribution(axes, data, csd)
+    for cake in data.cakes:
+        _cake(axes, data, cake)
     means = calibrated.measured_means(data)
     keys = []
     if means["left_out_m_kg"].notna().any():
@@ -50,7 +51,8 @@ def draw(data: CalibrationData) -> Figure:
 
 
 def typical_errors(means: pd.DataFrame) -> str:
-    """Root mean square of the ln errors against the measured means of the distributions, in words."""
+    """Root mean square of the ln errors against the measured means of the cakes, in words."""
+    by = "cake" if means["pressure_kPa"].notna().any() else "distribution"
     measured = np.log(means["measured_m_kg"].to_numpy(np.float64))
     words = []
     for column, what in (("modelled_m_kg", "modelled"), ("left_out_m_kg", "predicted from the others")):
@@ -59,22 +61,22 @@ def typical_errors(means: pd.DataFrame) -> str:
         if error.size:
             percent = 100.0 * math.sqrt(float(np.mean(error**2)))
             words.append(f"{percent:.{0 if percent >= 9.95 else 1}f} % {what}")
-    return f"typical error of ln(resistance) by distribution: {', '.join(words)}"
+    return f"typical error of ln(resistance) by {by}: {', '.join(words)}"
 
 
-def _distribution(axes: Axes, data: CalibrationData, csd: str) -> None:
-    """Plot the measurements of a distribution; markers and both ends of the bars are the table's."""
-    rows = data.parity[data.parity["csd"] == csd]
+def _cake(axes: Axes, data: CalibrationData, cake: Cake) -> None:
+    """Plot the measurements of a cake; markers and both ends of the bars are the table's."""
+    rows, number = calibrated.of_cake(data.parity, *cake), data.shade(cake)
     measured, modelled = (rows[name].to_numpy(np.float64) for name in ("measured_m_kg", "modelled_m_kg"))
-    ink = style.colour(data.number(csd))
+    ink = style.colour(number)
     look: dict[str, Any] = {"fmt": "none", "ecolor": ink, "elinewidth": 0.8, "capsize": 2.0, "zorder": 3}
     # a bar through its own middle: the modelled value may lie beside its interval's
     low, high = (rows[f"modelled_{end}_m_kg"].to_numpy(np.float64) for end in ("low", "high"))
     axes.errorbar(measured, 0.5 * (low + high), yerr=0.5 * (high - low), **look)
     low, high = _measured_interval(rows)
     axes.errorbar(0.5 * (low + high), modelled, xerr=0.5 * (high - low), **look)
-    symbol = style.marker(data.number(csd))
-    axes.plot(measured, modelled, symbol, color=ink, label=data.label(csd), zorder=4, gid="modelled")
+    label = calibrated.cake_label(data, cake)
+    axes.plot(measured, modelled, style.marker(number), color=ink, label=label, zorder=4, gid="modelled")
 
 
 def _measured_interval(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
@@ -84,8 +86,8 @@ def _measured_interval(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
 
 
 def _left_out(axes: Axes, data: CalibrationData, means: pd.DataFrame) -> None:
-    for row in means.to_dict("records"):
-        number = data.number(str(row["csd"]))
+    for row, cake in zip(means.to_dict("records"), data.cakes, strict=True):
+        number = data.shade(cake)
         axes.plot(
             [row["measured_m_kg"]],
             [row["left_out_m_kg"]],

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from filtercake.calibration.rounds import SAFETY_FACTOR
+from filtercake.calibration.tables import SAFETY_FACTOR
 from filtercake.figures import calibrated, style
 from filtercake.figures.calibrated import CalibrationData
 

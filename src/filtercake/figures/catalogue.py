@@ -112,9 +112,7 @@ CALIBRATION_FIGURES: dict[str, FigureSpec] = {
     "calibration_resistance": FigureSpec("calibration_resistance"),
     "calibration_predictions": FigureSpec("calibration_predictions", lambda predicts, _: predicts),
     "filtration_fits": FigureSpec("filtration_fits", lambda _, measured: bool(measured.tests), of_tests=True),
-    "compressibility": FigureSpec(
-        "compressibility", lambda _, measured: bool(compressibility_by_csd(measured)), of_tests=True
-    ),
+    "compressibility": FigureSpec("compressibility", lambda _, measured: bool(compressibility_by_csd(measured))),
 }
 """Figures of calibrations."""
 

@@ -1,9 +1,10 @@
-"""Specific cake resistance against pressure drop: how compressible the cakes are."""
+"""Specific cake resistance against pressure drop: how compressible the cakes are, and the calibrated packings."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,8 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from filtercake.calibration.measurements import Measurement, Measurements, compressibility_by_csd, with_pressure
+from filtercake.calibration.measurements import Measurement, compressibility_by_csd, with_pressure
 from filtercake.figures import style
+from filtercake.figures.calibrated import CalibrationData, with_interval
 from filtercake.filtration.constant_pressure import CompressibilityFit
 from filtercake.statistics import quantile
 from filtercake.units import KILOPASCAL
@@ -21,24 +23,33 @@ BEYOND = 1.12
 """Factor by which a line extends beyond the lowest and the highest pressure."""
 MOST_DIGITS = 3
 """Digits behind the point of an exponent, at most."""
-LINE, BAND = "line", "band"
+LINE, BAND, PACKED = "line", "band", "packed"
+ENTRY_HEIGHT = 0.1
+"""Of an entry of the legend, in."""
 
 
-def draw(measurements: Measurements) -> Figure:
-    """Draw every distribution's resistances over pressure, with a power law where there are several pressures."""
-    figure, (axes,) = style.panels(width=style.MEDIUM, height=3.4)
-    series = with_pressure(measurements)
-    if not series:
+def draw(data: CalibrationData) -> Figure:
+    """Draw every distribution's resistances over pressure, with a power law where there are several pressures.
+
+    Beside them, where the packings know pressures, what they have at the calibrated parameters.
+    """
+    measurements = data.measurements
+    series = {} if measurements is None else with_pressure(measurements)
+    modelled = pd.DataFrame() if data.pressures is None else data.pressures
+    figure, (axes,) = style.panels(width=style.MEDIUM, height=3.4 + ENTRY_HEIGHT * 2 * len(modelled))
+    if measurements is None or not series:
         style.nothing(axes, "no resistance is given with its pressure")
         return figure
     fits = compressibility_by_csd(measurements)
     for index, (csd, entries) in enumerate(series.items()):
         _series(axes, csd, entries, fits.get(csd), index, len(series))
+    for row in modelled.to_dict("records"):
+        _packings(axes, data, row, list(series).index(str(row["csd"])))
     alpha = np.array([entry.resistance for entries in series.values() for entry in entries])
     style.resistance_axis(axes, alpha, log=True)
     _pressure_axis(axes, [entry.pressure_drop or np.nan for entries in series.values() for entry in entries])
     _widen(axes)
-    style.legend(figure, [axes], columns=1 if len(series) < 4 else 2)
+    style.legend(figure, [axes], columns=1 if len(series) < 4 or len(modelled) else 2)
     style.footer(figure, pd.DataFrame(), *_notes(fits))
     return figure
 
@@ -76,6 +87,30 @@ def _series(
     axes.plot(along / KILOPASCAL, value, color=ink, gid=LINE, zorder=2)
     if np.isfinite(low).all():
         axes.fill_between(along / KILOPASCAL, low, high, color=ink, alpha=0.18, linewidth=0.0, gid=BAND, zorder=1)
+
+
+def _packings(axes: Axes, data: CalibrationData, row: dict[Hashable, Any], index: int) -> None:
+    """Plot a distribution's calibrated packings at the measured pressures, with their 95 % intervals."""
+    own = data.parity[data.parity["csd"] == row["csd"]].drop_duplicates("pressure_kPa").sort_values("pressure_kPa")
+    pressure, value, low, high = (
+        own[name].to_numpy(np.float64)
+        for name in ("pressure_kPa", "modelled_m_kg", "modelled_low_m_kg", "modelled_high_m_kg")
+    )
+    ends = [row[f"exponent_modelled{end}"] for end in ("", "_low", "_high")]
+    ink: Any = style.colour(index)
+    axes.plot(
+        pressure,
+        value,
+        style.marker(index),
+        linestyle=(0, (4, 1.5)),
+        linewidth=1.0,
+        color=ink,
+        markerfacecolor="white",
+        label=f"{row['csd']}, calibrated packings: k = {with_interval(*ends)}".replace(" -", " −"),
+        gid=PACKED,
+        zorder=2.5,
+    )
+    axes.vlines(pressure, low, high, color=ink, linewidth=0.8, linestyle=(0, (2, 1)), zorder=2.4, gid=PACKED)
 
 
 def _label(csd: str, fit: CompressibilityFit | None) -> str:

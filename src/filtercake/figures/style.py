@@ -48,6 +48,10 @@ PUBLISHED_WORDS = {"simulation": "simulated", "measurement": "measured"}
 
 POROSITY = "Porosity (–)"
 COHESION = "Cohesion energy density (kJ/m³)"
+FRICTION = "Coefficient of friction (–)"
+ADHESION = "Work of adhesion (mJ/m²)"
+AXES = {"cohesion_kJ_m3": COHESION, "friction": FRICTION, "adhesion_mJ_m2": ADHESION}
+"""Labels of axes by the column that they show."""
 
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine

@@ -210,7 +210,8 @@ def calibration_values(data: CalibrationData) -> dict[str, Any]:
     -------
     dict
         ``kind``, ``name``, ``title``; ``law`` (of the resistance); ``counts``; ``estimates`` (value and interval by
-        parameter), ``friction`` where it was taken and not fitted; ``measured`` (means by distribution),
+        parameter), ``axis`` (property along which packings were made), ``held`` (the one beside it,
+        where it was taken and not fitted); ``measured`` (means by distribution),
         ``measurements`` (their number), ``predictions``; ``findings`` (sentences), ``ended`` (why the rounds ended);
         ``tests`` and ``pressures`` (numbers of filtration tests and of resistances with a pressure).
     """
@@ -220,19 +221,20 @@ def calibration_values(data: CalibrationData) -> dict[str, Any]:
         "name": data.name.removeprefix("calibration_"),
         "title": data.title or data.name,
         "law": selection.law_title(data.summary["resistance_law"]),
-        "counts": packing_counts(data.simulated),
+        "counts": packing_counts(data.packings),
         "estimates": {
             heading(name): calibrated.with_interval(*data.estimate(name)) for name in data.summary["parameters"]
         },
-        "friction": "" if data.fits_friction else f"{data.friction:g}",
+        "held": "" if data.fits_both else f"{heading(data.beside)} {data.held:g}",
+        "axis": calibrated.PROPERTIES[data.axis][0],
         "measurements": len(data.parity),
         "measured": [
             {
-                "label": data.label(str(row["csd"]), 200),
+                "label": calibrated.cake_label(data, cake, 200),
                 "measured": _range(row, "measured"),
                 "modelled": number(row["modelled_m_kg"], 3),
             }
-            for row in calibrated.measured_means(data).to_dict("records")
+            for row, cake in zip(calibrated.measured_means(data).to_dict("records"), data.cakes, strict=True)
         ],
         "predictions": []
         if data.predictions is None

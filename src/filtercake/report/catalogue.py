@@ -97,6 +97,12 @@ PAGES: dict[str, PageSpec] = {
     "compressibility": PageSpec(
         TABLES, "Compressibility", "Power laws of the resistance over pressure.", "tables/compressibility.csv"
     ),
+    "pressures": PageSpec(
+        TABLES,
+        "Compressibility, measured and packed",
+        "Exponents of the resistance over the pressure drop: of the measurements, and of the calibrated packings.",
+        "tables/pressures.csv",
+    ),
     "failed": PageSpec(FAILED, "Failed packings"),
     "provenance": PageSpec(PROVENANCE, "Provenance"),
 }

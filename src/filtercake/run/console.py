@@ -80,7 +80,7 @@ def success(results: Path, points: Points) -> str:
 def _answer(file: Path) -> Iterator[str]:
     """Say what a calibration found, and what must be known of it."""
     record = json.loads(file.read_text(encoding="utf-8"))
-    at = "" if record["friction"] is None else f", at a friction of {record['friction']:g}"
+    at = "" if record["fixed"] is None else f", at {record['beside']} = {record['fixed']:g}"
     for name, found in record["parameters"].items():
         yield f"{name} = {found['value']:.3g} (95 %: {found['low']:.3g} to {found['high']:.3g}){at}"
     for finding in record["findings"]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from filtercake.calibration.fit import Observation, Parameter, Response, calibrate
+from filtercake.calibration.fit import Observation, calibrate
+from filtercake.calibration.response import Parameter, Response
 from filtercake.units import FloatArray
 
 CASE = ("friction", "truth_kJ_m3", "distributions", "discrepancy")

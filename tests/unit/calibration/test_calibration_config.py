@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
 import pytest
 
-from filtercake.calibration.config import candidates, load_calibration, load_calibrations, settings_of
+from filtercake.calibration.config import (
+    PRESSED_FRICTIONS,
+    candidates,
+    load_calibration,
+    load_calibrations,
+    settings_of,
+)
 from filtercake.calibration.fit import pooled
 from filtercake.calibration.measurements import compressibility_by_csd
-from filtercake.calibration.rounds import BATCHES
+from filtercake.calibration.rounds import BATCHES, Settings
 from filtercake.errors import ConfigError
 from filtercake.filtration.resistance import implied_porosity
 
@@ -37,8 +44,8 @@ def test_a_calibration_is_a_study_of_its_own(tmp_path: Path) -> None:
     (observation,) = found.observations
     assert observation.ln_resistance == pytest.approx(math.log(1.4e9)) and observation.standard_error == 0.05
     settings = settings_of(found)
-    assert settings.cohesions == tuple(float(s) for s in range(0, 81, 10))
-    assert settings.density == 1180.0 and settings.frictions == (0.0, 0.1)
+    assert settings.levels == tuple(float(s) for s in range(0, 81, 10))
+    assert settings.density == 1180.0 and settings.beside == "friction" and settings.beside_levels == (0.0, 0.1)
 
 
 def test_candidates_are_every_point_in_every_batch(tmp_path: Path) -> None:
@@ -207,10 +214,88 @@ def test_a_study_that_cannot_be_used_is_named_with_the_file_that_names_it(tmp_pa
     assert any(problem.file.endswith("measured.yaml") for problem in found.value.problems)
 
 
-def test_a_study_of_pressed_cakes_is_refused(tmp_path: Path) -> None:
-    text = load(tmp_path).study.path.read_text().replace("file: tiny.csv", f"file: {CSV}")
-    assert "packing:\n" in text
-    text = text.replace("packing:\n", "packing:\n  protocol: filtration\n  pressure_kPa: 50\n")
-    (tmp_path / "pressed.yaml").write_text(text)
-    with pytest.raises(ConfigError, match=r"its packing.protocol is filtration, whose packings no calibration fits"):
-        load(tmp_path, TINY.replace("../tiny.yaml", str(tmp_path / "pressed.yaml")))
+PRESSED = """study: ../tiny_pressed.yaml
+measurements: measured.yaml
+"""
+
+
+def load_pressed(folder: Path, text: str = PRESSED, measured: str | None = None, study: str | None = None):
+    file = ROOT / "config/test/tiny_pressed.yaml"
+    if study is not None:
+        file = folder / "study.yaml"
+        file.write_text(study)
+    (folder / "measured.yaml").write_text(measured or pressed((20, 1.1e9), (100, 1.2e9)))
+    (folder / "mine.yaml").write_text(text.replace("../tiny_pressed.yaml", str(file)))
+    return load_calibration(folder / "mine.yaml", STUDIES)
+
+
+class TestPressedCakes:
+    def test_friction_is_fitted_to_cakes_at_their_own_pressures(self, tmp_path: Path) -> None:
+        found = load_pressed(tmp_path)
+        assert [p.name for p in found.parameters] == ["friction"] and found.doubts == ()
+        assert [item.cake for item in found.observations] == ["bimodal at 20 kPa", "bimodal at 100 kPa"]
+        settings = settings_of(found)
+        assert settings.levels == PRESSED_FRICTIONS and settings.pressures_kPa == (20.0, 50.0, 100.0)
+        assert (settings.beside, settings.beside_levels, settings.fixed) == ("adhesion_mJ_m2", (10.0,), 10.0)
+        assert Settings.from_dict(json.loads(json.dumps(settings.as_dict()))) == settings
+
+    def test_one_packing_serves_every_pressure_and_attraction(self, tmp_path: Path) -> None:
+        found = load_pressed(tmp_path, PRESSED + "adhesion_mJ_m2: {low: 0, high: 20}\nfit_friction: [0, 0.1, 0.3]\n")
+        assert [p.name for p in found.parameters] == ["friction", "adhesion_mJ_m2"]
+        assert settings_of(found).beside_levels[0] == 0.0 and settings_of(found).beside_levels[-1] == 20.0
+        points = candidates(found, lambda *_: "")
+        assert len(points) == BATCHES * 3 == len({item.point.packings for item in points})
+        assert {item.point.scene.attraction for item in points} == {"adhesion"}
+
+    def test_pressures_a_little_apart_are_the_same(self, tmp_path: Path) -> None:
+        found = load_pressed(tmp_path, measured=pressed((50, 1.1e9), (50.2, 1.2e9)))
+        assert {item.cake for item in found.observations} == {"bimodal at 50 kPa"}
+
+    def test_a_resistance_without_a_pressure_is_taken_at_the_study_s_and_said(self, tmp_path: Path) -> None:
+        found = load_pressed(tmp_path, measured=MEASUREMENTS.replace("VALUE", "1.1e+9"))
+        assert [item.pressure_kPa for item in found.observations] == [50.0]
+        (doubt,) = found.doubts
+        assert doubt.kind == "pressure" and "taken for one at the study's 50 kPa" in doubt.text
+        study = (ROOT / "config/test/tiny_pressed.yaml").read_text().replace("  pressure_kPa: 50\n", "", 1)
+        with pytest.raises(ConfigError, match="bimodal has no pressure_drop_kPa: give the study"):
+            load_pressed(tmp_path, measured=MEASUREMENTS.replace("VALUE", "1.1e+9"), study=study)
+        with pytest.raises(ConfigError, match="predict needs the pressure to predict at"):
+            load_pressed(tmp_path, PRESSED + "predict: [bimodal]\n", study=study)
+
+    def test_a_study_with_cohesion_keeps_it(self, tmp_path: Path) -> None:
+        study = (ROOT / "config/test/tiny_pressed.yaml").read_text()
+        study = study.replace("  adhesion_mJ_m2: 10\n", "  cohesion_kJ_m3: 30\n", 1).replace(
+            "    adhesion_mJ_m2: [1, 10]\n", ""
+        )
+        settings = settings_of(load_pressed(tmp_path, study=study))
+        assert (settings.beside, settings.fixed) == ("cohesion_kJ_m3", 30.0)
+
+    @pytest.mark.parametrize(
+        ("line", "says"),
+        [
+            (
+                "cohesion_kJ_m3: {low: 0, high: 80}",
+                "cohesion_kJ_m3 = given: .* is filtration",
+            ),
+            ("friction: 0.1", "friction = given: .*fit_friction names the values packed"),
+            ("rival_friction: [0.1]", "rival_friction = given"),
+            ("pressure_kPa: 50", "compared with cakes at its own pressure drop"),
+            ("estimator: paper_count", "pressed cakes have an interior only"),
+            ("engine: liggghts", "cakes are pressed by the embedded engine"),
+            ("adhesion_mJ_m2: {low: 5, high: 1}", "low must be below high"),
+            ("adhesion_mJ_m2: 90000", "adhesion_mJ_m2"),
+            ("fit_friction: [0, 0.1]", "at least 3"),
+            ("fit_friction: [0, 0.3, 0.1]", "ascending"),
+        ],
+    )
+    def test_what_they_do_not_know_is_refused(self, tmp_path: Path, line: str, says: str) -> None:
+        with pytest.raises(ConfigError, match=says):
+            load_pressed(tmp_path, f"{PRESSED}{line}\n")
+
+    def test_a_cake_that_cannot_be_pressed_is_named_with_its_pressure(self, tmp_path: Path) -> None:
+        with pytest.raises(ConfigError, match=r"bimodal at 0.05 kPa and 10 mJ/m2: holds 0.\d+ kPa, more than"):
+            load_pressed(tmp_path, measured=pressed((0.05, 1.1e9), (100, 1.2e9)))
+
+    def test_beds_know_no_adhesion(self, tmp_path: Path) -> None:
+        with pytest.raises(ConfigError, match="adhesion_mJ_m2 = given: the study's packing"):
+            load(tmp_path, TINY + "adhesion_mJ_m2: 5\n")

@@ -11,19 +11,18 @@ import pytest
 from filtercake.calibration.fit import (
     Calibration,
     Observation,
-    Parameter,
-    Response,
     _Groups,
     _scale,
-    _variances,
     advised_friction,
     calibrate,
     compare_friction,
     good_enough,
     leave_one_out,
-    next_cohesions,
+    next_values,
     predict,
+    slope,
 )
+from filtercake.calibration.response import Parameter, Response, SharedResponse, _variances
 from filtercake.errors import CalibrationError
 
 COHESION = Parameter("cohesion_kJ_m3", 0.0, 100.0)
@@ -317,7 +316,8 @@ class TestContradictions:
         assert self.fit(30.0, 80.0, 60.0).threshold == pytest.approx(18.51, rel=1e-3)
         assert self.fit(50.0, 51.0).threshold == pytest.approx(3.8415, abs=1e-4)
         # beside a sharp one of another cake, the doubtful two count for little
-        groups = _Groups(("doubtful", "sharp"), np.array([0.1, 0.01]) ** 2, np.array([1.0, math.inf]), np.zeros((2, 1)))
+        errors, freedom = np.array([0.1, 0.01]) ** 2, np.array([1.0, math.inf])
+        groups = _Groups(("doubtful", "sharp"), errors, freedom, np.zeros((2, 1)), np.eye(2), np.eye(2))
         assert _scale(groups, 0.0, 1) == (1.0, pytest.approx((1.0 + 100.0) ** 2))
         assert _scale(groups, 0.5, 1) == (0.5, 1.0)
         assert _scale(groups, 9.0, 1) == (1.0, 1.0)
@@ -380,16 +380,16 @@ class TestUse:
         reach = math.log(doubted.high / doubted.low)
         assert reach == pytest.approx(math.hypot(math.log(plain.high / plain.low), 2.0 * 1.96 * 0.25), rel=0.03)
 
-    def test_next_cohesions_refine_where_the_interval_is(self) -> None:
+    def test_next_values_refine_where_the_interval_is(self) -> None:
         candidates = list(np.arange(0.0, 101.0, 5.0))
-        first = next_cohesions(None, candidates, [], 6, 4)
+        first = next_values(None, candidates, [], 6, 4)
         assert first == [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]
         found = fitted(1)
-        more = next_cohesions(found, candidates, first, 6, 4)
+        more = next_values(found, candidates, first, 6, 4)
         (estimate,) = found.estimates
         assert more and not set(more) & set(first) and len(more) <= 4
         assert all(estimate.low - 5.0 <= value <= estimate.high + 5.0 for value in more)
-        assert next_cohesions(found, candidates, candidates, 6, 4) == []
+        assert next_values(found, candidates, candidates, 6, 4) == []
 
     def test_good_enough(self) -> None:
         found = fitted(1)
@@ -399,3 +399,112 @@ class TestUse:
 
     def test_paper_advises_friction_by_porosity(self) -> None:
         assert advised_friction(0.35) == 0.0 and advised_friction(0.45) == 0.05
+
+
+class Curve:
+    """Packings by a law of the friction and, where there are two parameters, of the adhesion; with an error."""
+
+    def __init__(self, parameters: tuple[Parameter, ...], law, deviation: float) -> None:
+        self.parameters = parameters
+        self.law, self.deviation = law, deviation
+
+    def __call__(self, points):
+        return self.law(*np.atleast_2d(points).T), np.full(len(points), self.deviation**2)
+
+
+class TestCakesOfOneDistribution:
+    """Cakes at several pressures are of the same packings, whose errors do not average out."""
+
+    MU = Parameter("friction", 0.0, 0.7)
+
+    def found(self, correlation: float, drops=(20.0, 200.0), error: float = 0.01, packed: float = 0.05, shift=0.0):
+        observations = [
+            Observation(f"{p:g}", "a", -1.0 * 0.2 + 0.05 * math.log(p) + shift * k, error, p)
+            for k, p in enumerate(drops)
+        ]
+        responses = {
+            f"a at {p:g} kPa": Curve((self.MU,), lambda mu, p=p: -1.0 * mu + 0.05 * math.log(p), packed) for p in drops
+        }
+        return calibrate(observations, responses, correlation), responses
+
+    @pytest.mark.parametrize(("correlation", "variance"), [(0.0, 0.5), (1.0, 1.0), (0.5, 0.75)])
+    def test_the_interval_is_that_of_the_mean_of_correlated_errors(self, correlation: float, variance: float) -> None:
+        fit, _ = self.found(correlation)
+        (estimate,) = fit.estimates
+        assert estimate.value == pytest.approx(0.2, abs=1e-4)
+        # by the errors, or by Student's with one degree of freedom where they scatter less
+        assert fit.scale_freedom == math.inf
+        half = 1.959964 * math.sqrt(0.05**2 * variance + 0.01**2 / 2.0)
+        assert estimate.half_width == pytest.approx(half, rel=2e-3)
+
+    def test_the_squares_are_those_of_a_normal_distribution(self) -> None:
+        fit, _ = self.found(0.8, shift=0.03)
+        covariance = np.array([[0.05**2, 0.8 * 0.05**2], [0.8 * 0.05**2, 0.05**2]]) + 0.01**2 * np.eye(2)
+        residual = np.array([0.2 - fit.best[0], 0.2 - fit.best[0]]) * -1.0 + np.array([0.0, 0.03])
+        assert fit.chi_square == pytest.approx(residual @ np.linalg.solve(covariance, residual), rel=1e-3)
+        assert fit.degrees_of_freedom == 1
+
+    def test_a_wrong_compressibility_is_a_misfit_with_a_discrepancy(self) -> None:
+        """Errors shared by both pressures do not hide that the measured resistance rises faster."""
+        fit, _ = self.found(0.95, shift=0.2)
+        assert fit.discrepancy > 0.05 and "misfit" in {finding.kind for finding in fit.findings}
+        assert self.found(0.0, shift=0.2)[0].chi_square < fit.chi_square
+
+    def test_a_distribution_is_left_out_with_all_its_cakes(self) -> None:
+        _, responses = self.found(0.9)
+        drops = (20.0, 200.0)
+        observations = [
+            Observation(f"{c}{p:g}", c, -0.2 + 0.05 * math.log(p) + (0.1 if c == "b" else 0.0), 0.01, p)
+            for c in ("a", "b")
+            for p in drops
+        ]
+        both = {**responses, **{name.replace("a at", "b at"): own for name, own in responses.items()}}
+        errors = leave_one_out(observations, both, 0.9)
+        assert errors == {name: pytest.approx(0.1 if name[0] == "a" else -0.1, abs=1e-3) for name in both}
+        assert leave_one_out(observations[:2], responses, 0.9) == {}
+
+    @pytest.mark.parametrize("correlation", [0.0, 0.9])
+    def test_the_slope_s_interval_knows_that_errors_are_alike(self, correlation: float) -> None:
+        fit, responses = self.found(correlation)
+        found = slope(fit, np.log([20.0, 200.0]), list(responses.values()), correlation)
+        assert found.value == pytest.approx(0.05, abs=1e-3)
+        # the law's slope does not depend on the friction: what is left is the packings' own difference
+        expected = 1.96 * 0.05 * math.sqrt(2.0 * (1.0 - correlation)) / math.log(10.0)
+        assert 0.5 * (found.high - found.low) == pytest.approx(expected, rel=0.03)
+
+
+class TestSharedResponse:
+    FRICTION, ADHESION = Parameter("friction", 0.0, 0.5), Parameter("adhesion_mJ_m2", 0.0, 10.0)
+    MU, W = np.array([0.0, 0.1, 0.2, 0.35, 0.5]), (0.0, 2.5, 10.0)
+
+    def shared(self) -> SharedResponse:
+        random = np.random.default_rng(1)
+        noise = 0.03 * random.standard_normal((self.MU.size, 4))  # that of a packing, whatever the adhesion
+        along = [
+            Response(
+                (self.FRICTION,),
+                self.MU[:, None],
+                [-mu - 0.02 * w + row for mu, row in zip(self.MU, noise, strict=True)],
+            )
+            for w in self.W
+        ]
+        return SharedResponse((self.FRICTION, self.ADHESION), self.W, along)
+
+    def test_is_exact_at_its_values_and_smooth_between(self) -> None:
+        shared = self.shared()
+        for w, response in zip(self.W, shared.along, strict=True):
+            points = np.column_stack([self.MU, np.full(self.MU.size, w)])
+            for mine, own in zip(shared(points), response(self.MU[:, None]), strict=True):
+                np.testing.assert_allclose(mine, own)
+        between = shared(np.array([[0.2, 1.25]]))[0] - shared(np.array([[0.2, 0.0]]))[0]
+        assert between == pytest.approx(-0.025, abs=0.005)
+
+    def test_packings_count_once_however_many_adhesions_they_serve(self) -> None:
+        shared = self.shared()
+        variance = shared(np.array([[0.2, 2.5]]))[1][0]
+        alone = shared.along[1](np.array([[0.2]]))[1][0]
+        assert variance == pytest.approx(alone)
+
+    def test_needs_two_values(self) -> None:
+        with pytest.raises(CalibrationError, match="1 value of adhesion_mJ_m2 is too few"):
+            SharedResponse((self.FRICTION, self.ADHESION), (1.0,), self.shared().along[:1])

@@ -10,7 +10,9 @@ import pandas as pd
 import pytest
 
 from filtercake.calibration import rounds as study
-from filtercake.calibration.fit import Finding, Observation, Parameter, pooled
+from filtercake.calibration import tables
+from filtercake.calibration.fit import Finding, Observation, pooled
+from filtercake.calibration.response import Parameter
 from filtercake.calibration.rounds import BATCHES, Candidate, Settings, Task, choose_round, conclude
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
 from filtercake.errors import CalibrationError
@@ -31,10 +33,11 @@ CSDS: dict[str, CrystalSizeDistribution] = {
 def settings(**changes: object) -> Settings:
     values: dict[str, object] = {
         "parameters": (Parameter("cohesion_kJ_m3", 0.0, 100.0),),
-        "frictions": (0.0,),
+        "levels": COHESIONS,
+        "beside": "friction",
+        "beside_levels": (0.0,),
         "measured": ("fine", "coarse"),
         "predicted": ("new",),
-        "cohesions": COHESIONS,
         "estimator": "interior",
         "rounds": 4,
         "relative_ci95_target": 0.1,
@@ -90,7 +93,7 @@ OBSERVATIONS = [Observation(name, name, law(name, TRUTH, 0.0), 0.02) for name in
 def run_rounds(
     chosen: Settings, observations: list[Observation], most: int = 20
 ) -> tuple[list[study.Round], list[str]]:
-    everything = candidates(chosen.frictions)
+    everything = candidates(chosen.beside_levels)
     visited: list[str] = []
     rounds: list[study.Round] = []
     while not (rounds and rounds[-1].finished):
@@ -130,7 +133,7 @@ class TestRounds:
         assert f"every candidate has its {BATCHES} batches" in rounds[-1].why
 
     def test_rivals_are_packed_once_only(self) -> None:
-        rounds, _ = run_rounds(settings(frictions=(0.0, 0.05), relative_ci95_target=0.05), OBSERVATIONS)
+        rounds, _ = run_rounds(settings(beside_levels=(0.0, 0.05), relative_ci95_target=0.05), OBSERVATIONS)
         assert any("mu0.05" in name for name in rounds[0].points)
         assert not any("mu0.05" in name for made in rounds[1:] for name in made.points)
 
@@ -139,15 +142,15 @@ class TestOutcome:
     def outcome(self, chosen: Settings | None = None) -> tuple[study.Outcome, pd.DataFrame]:
         chosen = chosen or settings()
         _, visited = run_rounds(chosen, OBSERVATIONS)
-        table = packed([c for c in candidates(chosen.frictions) if c.point.name in visited])
+        table = packed([c for c in candidates(chosen.beside_levels) if c.point.name in visited])
         return conclude(chosen, OBSERVATIONS, table), table
 
     def test_finds_the_truth_and_says_so(self) -> None:
         outcome, _ = self.outcome()
-        record = study.summary(outcome, settings(), "because")
+        record = tables.summary(outcome, settings(), "because")
         found = record["parameters"]["cohesion_kJ_m3"]
         assert found["low"] < TRUTH < found["high"] and found["high"] - found["low"] < 25.0
-        assert record["friction"] == 0.0 and record["ended"] == "because" and record["findings"] == []
+        assert record["fixed"] == 0.0 and record["ended"] == "because" and record["findings"] == []
         assert set(outcome.left_out) == {"fine", "coarse"} and max(map(abs, outcome.left_out.values())) < 0.1
 
     def test_a_failed_point_is_left_out(self) -> None:
@@ -176,7 +179,7 @@ class TestOutcome:
             )
 
     def test_a_rival_with_too_few_packings_is_said(self) -> None:
-        chosen = settings(frictions=(0.0, 0.05))
+        chosen = settings(beside_levels=(0.0, 0.05))
         _, table = self.outcome(chosen)
         bad = (table["friction"] == 0.05) & (table["csd"] == "coarse") & (table["cohesion_kJ_m3"] < 90.0)
         table.loc[bad, "status"] = "failed"
@@ -197,13 +200,13 @@ class TestOutcome:
     def test_one_distribution_and_two_parameters_are_reported_as_confounded(self) -> None:
         chosen = settings(
             parameters=(Parameter("cohesion_kJ_m3", 0.0, 100.0), Parameter("friction", 0.0, 0.1)),
-            frictions=(0.0, 0.05, 0.1),
+            beside_levels=(0.0, 0.05, 0.1),
             measured=("fine",),
         )
         truth = OBSERVATIONS[:1]
-        first = choose_round(0, chosen, candidates(chosen.frictions), [], truth, None)
-        table = packed([c for c in candidates(chosen.frictions) if c.point.name in first.points])
-        record = study.summary(conclude(chosen, truth, table), chosen, "")
+        first = choose_round(0, chosen, candidates(chosen.beside_levels), [], truth, None)
+        table = packed([c for c in candidates(chosen.beside_levels) if c.point.name in first.points])
+        record = tables.summary(conclude(chosen, truth, table), chosen, "")
         said = {finding["kind"]: finding["text"] for finding in record["findings"]}
         assert said["confounded"] == (
             "1 measured distribution cannot determine 2 parameters: cohesion energy density and coefficient of "
@@ -217,14 +220,14 @@ class TestOutcome:
     def test_doubts_of_the_measurements_come_first(self) -> None:
         doubt = Finding("pressure", "the resistance rises with pressure")
         outcome = conclude(settings(doubts=(doubt,)), OBSERVATIONS, self.outcome()[1])
-        assert study.summary(outcome, settings(), "")["findings"][0] == {"kind": "pressure", "text": doubt.text}
+        assert tables.summary(outcome, settings(), "")["findings"][0] == {"kind": "pressure", "text": doubt.text}
 
     def test_rivals_are_compared(self) -> None:
-        chosen = settings(frictions=(0.0, 0.05))
+        chosen = settings(beside_levels=(0.0, 0.05))
         outcome, _ = self.outcome(chosen)
         assert set(outcome.rivals) == {0.0, 0.05}
         assert any("friction" in finding.text for finding in outcome.findings)
-        objective = study.objective_table(outcome, chosen)
+        objective = tables.objective_table(outcome, chosen)
         assert sorted(objective["friction"].unique()) == [0.0, 0.05]
         assert objective.groupby("friction")["deviance"].min().tolist() == [0.0, 0.0]
         against = conclude(settings(implied_porosity=0.45), OBSERVATIONS, self.outcome()[1])
@@ -261,26 +264,26 @@ class TestOutcome:
     def test_friction_can_be_fitted(self) -> None:
         chosen = settings(
             parameters=(Parameter("cohesion_kJ_m3", 0.0, 100.0), Parameter("friction", 0.0, 0.1)),
-            frictions=(0.0, 0.05, 0.1),
+            beside_levels=(0.0, 0.05, 0.1),
         )
         truth = [Observation(n, n, law(n, TRUTH, 0.04), 0.01) for n in ("fine", "coarse")]
-        first = choose_round(0, chosen, candidates(chosen.frictions), [], truth, None)
+        first = choose_round(0, chosen, candidates(chosen.beside_levels), [], truth, None)
         assert len(first.points) == 2 * 3 * study.COARSE
-        table = packed([c for c in candidates(chosen.frictions) if c.point.name in first.points])
+        table = packed([c for c in candidates(chosen.beside_levels) if c.point.name in first.points])
         outcome = conclude(chosen, truth, table)
         cohesion, friction = outcome.fit.estimates
         assert cohesion.low < TRUTH < cohesion.high and friction.low < 0.04 < friction.high
-        assert study.summary(outcome, chosen, "")["friction"] is None
-        assert len(study.objective_table(outcome, chosen)) == outcome.fit.deviance.size
-        assert set(study.response_table(outcome, chosen)["csd"]) == {"fine", "coarse"}
+        assert tables.summary(outcome, chosen, "")["fixed"] is None
+        assert len(tables.objective_table(outcome, chosen)) == outcome.fit.deviance.size
+        assert set(tables.response_table(outcome, chosen, OBSERVATIONS)["csd"]) == {"fine", "coarse"}
 
     def test_tables_hold_what_was_fitted(self) -> None:
         outcome, _ = self.outcome()
-        parity = study.parity_table(outcome, settings(), OBSERVATIONS)
+        parity = tables.parity_table(outcome, settings(), OBSERVATIONS)
         assert parity["measured_m_kg"].to_numpy() == pytest.approx([math.exp(o.ln_resistance) for o in OBSERVATIONS])
         assert (parity["modelled_low_m_kg"] < parity["modelled_m_kg"]).all()
         assert np.log(parity["modelled_m_kg"] / parity["measured_m_kg"]).abs().max() < 0.06
-        curve = study.response_table(outcome, settings())
+        curve = tables.response_table(outcome, settings(), OBSERVATIONS)
         fine = curve[curve["csd"] == "fine"]
         exact = [law("fine", s, 0.0) for s in fine["cohesion_kJ_m3"]]
         assert np.abs(np.log(fine["resistance_m_kg"]) - exact).max() < 0.08
@@ -291,7 +294,7 @@ class TestOutcome:
         _, table = self.outcome()
         outcome = conclude(settings(), twice, table)
         assert "contradiction" in {finding.kind for finding in outcome.findings}
-        parity = study.parity_table(outcome, settings(), twice)
+        parity = tables.parity_table(outcome, settings(), twice)
         own = parity[parity["csd"] == "fine"]
         scatter = pooled(twice)["fine"].scatter
         assert own["relative_uncertainty"].tolist() == pytest.approx([math.hypot(scatter, e) for e in (0.02, 0.01)])
@@ -315,7 +318,7 @@ class TestPrediction:
             viscosity=1e-3,
             slurry_concentration=200.0,
         )
-        (row,) = study.prediction_table(outcome, settings(), new, CSDS, drum, 20.0 / 3600.0).to_dict("records")
+        (row,) = tables.prediction_table(outcome, settings(), new, CSDS, drum, 20.0 / 3600.0).to_dict("records")
         truth = math.exp(law("new", TRUTH, 0.0))
         assert row["resistance_low_m_kg"] < truth < row["resistance_high_m_kg"]
         assert row["high_over_resistance"] == pytest.approx(row["resistance_high_m_kg"] / row["resistance_m_kg"])
@@ -330,14 +333,14 @@ class TestPrediction:
         outcome, _ = TestOutcome().outcome()
         names = study.prediction_points(settings(), candidates(), outcome.fit)
         new = packed([c for c in candidates() if c.point.name in names])
-        (row,) = study.prediction_table(outcome, settings(resistance_law=CARMAN), new, CSDS).to_dict("records")
+        (row,) = tables.prediction_table(outcome, settings(resistance_law=CARMAN), new, CSDS).to_dict("records")
         found = resistance(CARMAN, row["porosity_low"], CSDS["new"], 1180.0)
         assert found == pytest.approx(row["resistance_high_m_kg"])
 
     def test_needs_packings(self) -> None:
         outcome, table = TestOutcome().outcome()
         with pytest.raises(CalibrationError, match="for a prediction: new has them at 0 of 0"):
-            study.prediction_table(outcome, settings(), table, CSDS)
+            tables.prediction_table(outcome, settings(), table, CSDS)
 
 
 def test_settings_and_task_survive_being_params() -> None:

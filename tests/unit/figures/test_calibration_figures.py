@@ -16,17 +16,11 @@ from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from filtercake.calibration.fit import Observation, Parameter
+from filtercake.calibration.fit import Observation
 from filtercake.calibration.measurements import Measurements, load_measurements
-from filtercake.calibration.rounds import (
-    Settings,
-    conclude,
-    objective_table,
-    parity_table,
-    prediction_table,
-    response_table,
-    summary,
-)
+from filtercake.calibration.response import Parameter
+from filtercake.calibration.rounds import Settings, conclude
+from filtercake.calibration.tables import objective_table, parity_table, prediction_table, response_table, summary
 from filtercake.crystals.csd import mixture
 from filtercake.figures import catalogue, style
 from filtercake.figures.calibrated import CalibrationData, with_interval
@@ -112,10 +106,11 @@ def make(
         parameters.append(Parameter("friction", frictions[0], frictions[-1]))
     settings = Settings(
         parameters=tuple(parameters),
-        frictions=tuple(frictions),
+        beside="friction",
+        beside_levels=tuple(frictions),
         measured=tuple(measured),
         predicted=tuple(predicted),
-        cohesions=COHESIONS,
+        levels=COHESIONS,
         estimator="interior",
         rounds=4,
         relative_ci95_target=0.1,
@@ -139,7 +134,7 @@ def make(
         summary=json.loads(json.dumps(summary(outcome, settings, "within 10 %"))),
         parity=parity_table(outcome, settings, observations),
         objective=objective_table(outcome, settings),
-        response=response_table(outcome, settings),
+        response=response_table(outcome, settings, observations),
         simulated=simulated,
         predictions=predictions,
         labels=LABELS,
@@ -217,7 +212,7 @@ def spans(artists: Sequence[Any]) -> list[tuple[float, float]]:
 class TestCatalogue:
     def test_predictions_have_their_own(self) -> None:
         assert set(figures_of(True)) - set(figures_of(False)) == {"calibration_predictions"}
-        of_tests = [name for name, figure in CALIBRATION_FIGURES.items() if figure.of_tests]
+        of_tests = {name for name, figure in CALIBRATION_FIGURES.items() if figure.of_tests} | {"compressibility"}
         assert figures_of(True) == [name for name in CALIBRATION_FIGURES if name not in of_tests]
         measurements = load_measurements(EXAMPLE)
         assert figures_of_calibration(True, measurements) == list(CALIBRATION_FIGURES)
@@ -267,7 +262,7 @@ class TestEveryFigure:
         for name in figures_of(data.predictions is not None):
             said = texts(draw(name, data))
             assert "resistances from the interior porosity" in said and "embedded engine" in said
-            assert ("cohesion and friction fitted" in said) == data.fits_friction
+            assert ("cohesion and friction fitted" in said) == data.fits_both
 
 
 def test_is_saved_as_png_and_pdf(cases: dict[str, CalibrationData], tmp_path: Path) -> None:
@@ -306,9 +301,9 @@ class TestObjective:
             rows = data.objective[data.objective["friction"] == float(friction)]
             assert line.get_xdata() == pytest.approx(rows["cohesion_kJ_m3"].to_numpy())
             assert line.get_ydata() == pytest.approx(rows["deviance"].to_numpy())
-        assert spans(marked(axes, "interval")) == [pytest.approx(data.cohesion[1:])]
+        assert spans(marked(axes, "interval")) == [pytest.approx(data.found[1:])]
         (best,), (threshold,) = marked(axes, "best"), marked(axes, "threshold")
-        assert best.get_xdata()[0] == data.cohesion[0] and best.get_ydata()[0] == 0.0
+        assert best.get_xdata()[0] == data.found[0] and best.get_ydata()[0] == 0.0
         assert threshold.get_ydata()[0] == data.summary["threshold"] >= 3.841
         assert threshold.get_ydata()[0] < axes.get_ylim()[1] <= 20.0
 
@@ -318,7 +313,7 @@ class TestObjective:
         (threshold,) = marked(axes, "threshold")
         assert threshold.get_ydata()[0] == pytest.approx(7.709, abs=1e-3)
         assert "95 % threshold of one parameter (7.71)" in texts(axes.figure)
-        assert spans(marked(axes, "interval")) == [pytest.approx(data.cohesion[1:])]
+        assert spans(marked(axes, "interval")) == [pytest.approx(data.found[1:])]
         high = dataclasses.replace(data, summary={**data.summary, "threshold": 161.45})
         (axes,) = draw("calibration_objective", high).axes
         assert axes.get_ylim()[1] > 161.45
@@ -371,7 +366,7 @@ class TestFittedFriction:
         fitted = data.summary["parameters"]
         assert best.get_xydata()[0] == pytest.approx([fitted["cohesion_kJ_m3"]["value"], fitted["friction"]["value"]])
         horizontal, vertical = marked(axes, "interval")
-        assert tuple(horizontal.get_xdata()) == data.cohesion[1:]
+        assert tuple(horizontal.get_xdata()) == data.found[1:]
         assert tuple(vertical.get_ydata()) == data.estimate("friction")[1:]
 
     def test_outline_reaches_as_far_as_the_intervals(self, cases: dict[str, CalibrationData]) -> None:
@@ -380,7 +375,7 @@ class TestFittedFriction:
         (outline,) = marked(axes, "region")
         assert list(outline.levels) == [pytest.approx(data.summary["threshold"])]
         points = np.vstack([path.vertices for path in outline.get_paths()])
-        assert (points[:, 0].min(), points[:, 0].max()) == pytest.approx(data.cohesion[1:], rel=1e-3)
+        assert (points[:, 0].min(), points[:, 0].max()) == pytest.approx(data.found[1:], rel=1e-3)
         assert (points[:, 1].min(), points[:, 1].max()) == pytest.approx(data.estimate("friction")[1:], rel=1e-2)
 
     def test_says_the_squares(self, cases: dict[str, CalibrationData]) -> None:
@@ -470,7 +465,7 @@ class TestResistance:
         curves = [line for axes in panels for line in marked(axes, "response")]
         bands = [band for axes in panels for band in marked(axes, "band")]
         for csd, line, band in zip(data.measured, curves, bands, strict=True):
-            rows = data.response[(data.response["csd"] == csd) & np.isclose(data.response["friction"], data.friction)]
+            rows = data.response[(data.response["csd"] == csd) & np.isclose(data.response["friction"], data.held)]
             x, y = rows["cohesion_kJ_m3"].to_numpy(), rows["resistance_m_kg"].to_numpy()
             assert line.get_xdata() == pytest.approx(x) and line.get_ydata() == pytest.approx(y)
             vertices = band.get_paths()[0].vertices
@@ -491,8 +486,8 @@ class TestResistance:
             assert box.get_y() + box.get_height() == pytest.approx(value * reach, rel=1e-6)
         for axes in panels:
             (chosen,) = marked(axes, "chosen")
-            assert chosen.get_xdata()[0] == data.cohesion[0]
-            assert spans(marked(axes, "interval")) == [pytest.approx(data.cohesion[1:])]
+            assert chosen.get_xdata()[0] == data.found[0]
+            assert spans(marked(axes, "interval")) == [pytest.approx(data.found[1:])]
 
     def test_measurements_of_one_distribution_are_averaged_as_in_the_fit(
         self, cases: dict[str, CalibrationData]
@@ -557,7 +552,7 @@ class TestResistance:
         assert points.get_markerfacecolor() == "white"
         expected = np.exp(rows["ln_resistance"]).groupby(rows["cohesion_kJ_m3"]).mean()
         assert points.get_ydata() == pytest.approx(expected.to_numpy())
-        assert f"friction 0.1, the nearest to the {data.friction:.3g} of the curves" in texts(figure)
+        assert f"friction 0.1, the nearest to the {data.held:.3g} of the curves" in texts(figure)
 
     def test_one_packing_has_no_interval(self, cases: dict[str, CalibrationData]) -> None:
         data = cases["one"]

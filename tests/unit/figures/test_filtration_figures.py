@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
@@ -20,6 +21,7 @@ from filtercake.calibration.measurements import (
     load_measurements,
 )
 from filtercake.figures import compressibility, filtration_fits, style
+from filtercake.figures.calibrated import CalibrationData
 from filtercake.figures.filtration_fits import with_interval
 from filtercake.filtration.analysis import analyse
 from filtercake.filtration.constant_pressure import FiltrationTest
@@ -180,9 +182,15 @@ def test_values_are_written_with_two_digits_of_their_interval(value: float, half
     assert with_interval(value, half) == written
 
 
+def calibrated_by(measurements: Measurements) -> CalibrationData:
+    """Return the data of a calibration of which the figure sees no more than the measurements."""
+    nothing = pd.DataFrame()
+    return CalibrationData("x", "", {}, nothing, nothing, nothing, nothing, None, {}, measurements)
+
+
 class TestCompressibility:
     def test_points_line_and_band(self, example: Measurements) -> None:
-        figure = drawn(compressibility.draw(example))
+        figure = drawn(compressibility.draw(calibrated_by(example)))
         (axes,) = figure.axes
         (points,) = axes.containers
         assert isinstance(points, ErrorbarContainer)
@@ -211,7 +219,7 @@ class TestCompressibility:
         values = [("a", dp, 1e9 * (dp / 1e5) ** 0.4 * by) for dp, by in ((2e4, 1.0), (5e4, 1.1), (1e5, 0.95))]
         values += [("b", 2e4, 2e9), ("b", 8e4, 1e9), ("c", 5e4, 5e9), ("d", None, 1e9)]
         found = of_values(*values)
-        figure = drawn(compressibility.draw(found))
+        figure = drawn(compressibility.draw(calibrated_by(found)))
         said, fits = texts(figure), compressibility_by_csd(found)
         assert fits["a"].exponent == pytest.approx(0.38, abs=0.01)
         assert fits["a"].exponent_ci95 == pytest.approx(1.13, abs=0.01)
@@ -223,11 +231,11 @@ class TestCompressibility:
         assert labels[2] == "c" and len(labels) == 3
 
     def test_points_at_one_pressure_stand_alone(self) -> None:
-        figure = drawn(compressibility.draw(of_values(("a", 5e4, 1e9), ("b", 5e4, 2e9))))
+        figure = drawn(compressibility.draw(calibrated_by(of_values(("a", 5e4, 1e9), ("b", 5e4, 2e9)))))
         (axes,) = figure.axes
         assert len(axes.containers) == 2 and not marked(axes, "line")
         assert "intervals of the line" not in texts(figure)
 
     @pytest.mark.parametrize("found", [NOTHING, of_values(("a", None, 1e9))])
     def test_without_pressures_it_says_so(self, found: Measurements) -> None:
-        assert "no resistance is given with its pressure" in texts(drawn(compressibility.draw(found)))
+        assert "no resistance is given with its pressure" in texts(drawn(compressibility.draw(calibrated_by(found))))

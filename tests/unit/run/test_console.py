@@ -13,14 +13,15 @@ def test_a_calibration_ends_with_its_answer_its_findings_and_its_files(tmp_path:
     (folder / "tables").mkdir(parents=True)
     record = {
         "parameters": {"cohesion_kJ_m3": {"value": 37.94, "low": 30.1, "high": 45.26}},
-        "friction": 0.1,
+        "beside": "friction",
+        "fixed": 0.1,
         "findings": [{"kind": "failed", "text": "3 points without an accepted packing: the rest decides"}],
     }
     (folder / "calibration.json").write_text(json.dumps(record))
     said = console.success(tmp_path, {"calibration_mine": {}}).splitlines()
     assert said == [
         "",
-        "calibration_mine: cohesion_kJ_m3 = 37.9 (95 %: 30.1 to 45.3), at a friction of 0.1",
+        "calibration_mine: cohesion_kJ_m3 = 37.9 (95 %: 30.1 to 45.3), at friction = 0.1",
         "calibration_mine: failed: 3 points without an accepted packing: the rest decides",
         f"calibration_mine: tables in {folder}/tables, numbers in {folder}/calibration.json",
     ]
