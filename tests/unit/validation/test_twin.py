@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from filtercake.validation.twin import Experiment, repeat_calibrations, summarise
+from filtercake.validation.twin import Experiment, repeat_calibrations, repeat_pressed, summarise
 
 VALUES = (0.0, 20.0, 30.0, 40.0, 50.0, 60.0, 80.0, 100.0)
 OFFSETS = {"fine": 0.2, "coarse": -0.4}
@@ -96,3 +96,39 @@ def test_shares_must_suffice_and_conditions_agree() -> None:
     other = packings(2, (35.0,), 4).assign(friction=0.05)
     with pytest.raises(ValueError, match="different frictions"):
         repeat_calibrations(packings(1, VALUES, 40), other, 20, Experiment(1, 0.05))
+
+
+def cakes(
+    seed: int, frictions: tuple[float, ...], replicates: int, drops: tuple[float, ...] = (20.0, 200.0)
+) -> pd.DataFrame:
+    """Pressed packings by a law; what a packing errs by is nearly the same at every pressure."""
+    random = np.random.default_rng(seed)
+    rows = []
+    for mu in frictions:
+        for k in range(replicates):
+            own = 0.03 * random.standard_normal()
+            for drop in drops:
+                value = 22.0 - mu / (mu + 0.2) + 0.02 * math.log(drop) + own + 0.005 * random.standard_normal()
+                rows.append(("a", mu, 10.0, drop, k, "ok", math.exp(value)))
+    names = ["csd", "friction", "adhesion_mJ_m2", "pressure_kPa", "replicate", "status", "resistance_m_kg"]
+    return pd.DataFrame(rows, columns=names)
+
+
+FRICTIONS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5)
+
+
+def test_friction_of_pressed_cakes_is_found_as_often_as_the_interval_says() -> None:
+    table = repeat_pressed(cakes(1, FRICTIONS, 80), cakes(2, (0.15,), 60), 40, Experiment(tests=4, noise=0.05))
+    assert set(table["pressures"]) == {2} and len(table) == 40
+    assert 34 <= table["covered"].sum() <= 40
+    assert table["error"].median() < 0.03
+    # the packings' shared error is in the interval: by the tests alone it would be narrower than this
+    steep = 0.2 / 0.35**2
+    assert (0.5 * (table["high"] - table["low"])).median() > 1.96 * 0.05 / math.sqrt(8.0) / steep
+
+
+def test_pressed_pool_and_truth_stick_alike() -> None:
+    with pytest.raises(ValueError, match="pool and truth have different adhesions"):
+        repeat_pressed(cakes(1, FRICTIONS, 4).assign(adhesion_mJ_m2=1.0), cakes(2, (0.15,), 4), 2, Experiment(1, 0.05))
+    with pytest.raises(ValueError, match="friction must have one value, not 2"):
+        repeat_pressed(cakes(1, FRICTIONS, 4), cakes(2, (0.15, 0.2), 4), 2, Experiment(1, 0.05))
