@@ -390,9 +390,9 @@ def pressed_candidates() -> list[Candidate]:
     return found
 
 
-def pressed_law(csd: str, mu: float, drop: float, adhesion: float, rise: float = 1.0) -> float:
+def pressed_law(csd: str, mu: float, drop: float, adhesion: float) -> float:
     """ln(alpha) of a pressed cake: friction loosens it, and adhesion does, the less the harder it is pressed."""
-    return 22.0 + OFFSETS[csd] - mu / (mu + 0.2) - 0.3 * (1.0 + mu) * rise * (adhesion / (20.0 * drop)) ** 0.5
+    return 22.0 + OFFSETS[csd] - mu / (mu + 0.2) - 0.3 * (1.0 + mu) * (adhesion / (20.0 * drop)) ** 0.5
 
 
 def pressed_packings(points: list[Candidate], adhesions: tuple[float, ...] = (10.0,)) -> pd.DataFrame:
@@ -410,11 +410,9 @@ def pressed_packings(points: list[Candidate], adhesions: tuple[float, ...] = (10
     return pd.DataFrame(rows)
 
 
-def pressed_observations(
-    mu: float, adhesion: float, csds=("fine", "coarse"), drops=DROPS, **law: float
-) -> list[Observation]:
+def pressed_observations(mu: float, adhesion: float, csds=("fine", "coarse"), drops=DROPS) -> list[Observation]:
     return [
-        Observation(f"{csd} {drop:g}", csd, pressed_law(csd, mu, drop, adhesion, **law), 0.01, drop)
+        Observation(f"{csd} {drop:g}", csd, pressed_law(csd, mu, drop, adhesion), 0.01, drop)
         for csd in csds
         for drop in drops
     ]
@@ -455,7 +453,11 @@ class TestPressedCakes:
         assert table["exponent_measured"].iloc[0] == pytest.approx(expected)
         assert table["exponent_modelled"].iloc[0] == pytest.approx(expected, abs=0.005)
         assert "pressure" not in {finding.kind for finding in outcome.findings}
-        broken = conclude(chosen, pressed_observations(0.15, 10.0, rise=6.0), simulated)
+        faster = [
+            dataclasses.replace(o, ln_resistance=o.ln_resistance + 0.15 * math.log((o.pressure_kPa or 0.0) / 50.0))
+            for o in pressed_observations(0.15, 10.0)
+        ]
+        broken = conclude(chosen, faster, simulated)
         said = [finding.text for finding in broken.findings if finding.kind == "pressure"]
         assert len(said) == 2 and "rises faster with pressure than that of the calibrated packings" in said[0]
 
