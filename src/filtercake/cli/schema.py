@@ -14,7 +14,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, WithJsonSchema
 from pydantic.fields import FieldInfo
 
-from filtercake.calibration.config import Calibration, CohesionRange
+from filtercake.calibration.config import AdhesionRange, Calibration, CohesionRange
 from filtercake.calibration.measurements import ConstantPressureTest, KnownResistance, MeasurementFile
 from filtercake.filtration.resistance import CARMAN
 from filtercake.packing.scene import FILTRATION_PROTOCOL
@@ -141,6 +141,7 @@ def reference() -> str:
         ("`published[]`", Published),
         ("A calibration: `config/calibrations/<name>.yaml`", Calibration),
         ("`cohesion_kJ_m3` of a calibration", CohesionRange),
+        ("`adhesion_mJ_m2` of a calibration", AdhesionRange),
         ("Measurements: `config/measurements/<name>.yaml`", MeasurementFile),
         ("`tests[]`", ConstantPressureTest),
         ("`resistances[]`", KnownResistance),
