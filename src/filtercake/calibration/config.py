@@ -44,7 +44,8 @@ from filtercake.study.config.values import (
     PathText,
 )
 from filtercake.study.limits import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP
-from filtercake.study.loading import LoadedStudy, find_studies, load_study, parse
+from filtercake.study.loading import LoadedStudy, find_studies, load_study
+from filtercake.study.parsing import parse
 from filtercake.study.points import ChooseEngine, expand
 from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL
 from filtercake.user_files import is_file, read_yaml

@@ -16,8 +16,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from filtercake.crystals.crystallizer import BIN_WIDTH, UPPER_SCALES
-from filtercake.crystals.csd import CrystalSizeDistribution, discretise
-from filtercake.crystals.instruments import MOST_CLASSES
+from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
 from filtercake.errors import CrystallizerError, CsdError
 from filtercake.units import MICROMETRE, FloatArray
 

@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from filtercake import __version__
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.liggghts import template_folder
 from filtercake.packing.result import sha256
@@ -121,6 +120,8 @@ def _meaning(source: str) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of filtercake, Python and the packages it stands on."""
+    from filtercake import __version__
+
     found = {"filtercake": __version__, "python": platform.python_version()}
     for package in PACKAGES:
         try:

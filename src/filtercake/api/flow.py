@@ -10,7 +10,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from filtercake.api.steps import ORIGIN, PLAIN_DENSITY, load_packing
+from filtercake.api.arguments import ORIGIN
+from filtercake.api.measured import load_packing
+from filtercake.api.steps import PLAIN_DENSITY
 from filtercake.crystals.csd import mixture
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
 from filtercake.filtration.resistance import KozenyConstant
@@ -22,7 +24,7 @@ from filtercake.permeability.resolution import ACCURACY, COARSEST_ACCURACY, FINE
 from filtercake.permeability.result import Level, Permeability
 from filtercake.study.config.values import TO_NUMBER, TO_WHOLE, Density, Model
 from filtercake.study.limits import unit_problems
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 from filtercake.units import MICROMETRE
 
 MOST_THREADS = 256
