@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,7 +18,6 @@ from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Pro
 from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.own_spheres import OwnSpheres, check_spheres, read_spheres
 from filtercake.packing.result import SEAL, Packing, read_record
-from filtercake.permeability.measure import Report, measure_bed, measure_cell
 from filtercake.permeability.replicates import constant_of
 from filtercake.permeability.resolution import ACCURACY, COARSEST_ACCURACY, FINEST_ACCURACY
 from filtercake.permeability.result import Level, Permeability
@@ -125,6 +124,7 @@ class PermeabilityOptions(Model):
     trust_units: bool = Field(default=False, description="Take density and sizes as they are, however unlikely.")
 
 
+Report = Callable[[str], None]
 Source = str | Path | Packing | Mapping[str, Any]
 """What a packing is given as."""
 
@@ -241,6 +241,8 @@ def _check_units(spheres: OwnSpheres) -> None:
 
 
 def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> Permeability:
+    from filtercake.permeability.measure import measure_bed, measure_cell
+
     position, radius, box = spheres.position, spheres.radius, spheres.box
     how: dict[str, Any] = {
         "accuracy": given.accuracy,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from filtercake.errors import CsdError, PackingRejected
 from filtercake.packing.porosity import measure, porosity_profile
@@ -15,6 +15,9 @@ from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
 from filtercake.packing.slab import bed_height
 from filtercake.units import MICROMETRE
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SLICES_PER_DIAMETER = 20
 
@@ -85,6 +88,8 @@ def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> 
     The columns are height_um (of a slice's middle) and porosity; errors are those of :func:`porosity`. A pressed cell
     is cut from its lower face to the upper one, with what reaches in from beyond.
     """
+    import pandas as pd
+
     packing, _ = load_packing(Path(npz))
     if packing.is_cell:
         packing = _stacked(packing)

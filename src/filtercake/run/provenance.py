@@ -71,10 +71,18 @@ def _closure(start: Path, closed: Path | None = None) -> set[Path]:
         if path in found:
             continue
         found.add(path)
-        waiting += [parent / "__init__.py" for parent in path.parents if ROOT in (parent, *parent.parents)]
+        waiting += _packages(path.parent)
         if path != closed:
             waiting += _imports(path)
     return found
+
+
+@cache
+def _packages(folder: Path) -> tuple[Path, ...]:
+    """Files of the packages that a folder is and lies in, up to ``ROOT``; none outside of it."""
+    if folder == ROOT:
+        return (folder / "__init__.py",)
+    return (*_packages(folder.parent), folder / "__init__.py") if ROOT in folder.parents else ()
 
 
 def packing_code(engine: str) -> str:
