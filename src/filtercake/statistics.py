@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from filtercake.units import FloatArray
@@ -40,7 +39,9 @@ def quantile(freedom: float = math.inf, confidence: float = CONFIDENCE) -> float
     confidence : float
         Confidence level.
     """
-    return float(scipy.special.stdtrit(freedom, 0.5 + 0.5 * confidence)) if freedom > 0.0 else math.nan
+    from scipy import special  # costs more than all else of a short command
+
+    return float(special.stdtrit(freedom, 0.5 + 0.5 * confidence)) if freedom > 0.0 else math.nan
 
 
 def likelihood_limit(freedom: float = math.inf) -> float:

@@ -7,12 +7,14 @@ import os
 import re
 import stat
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
-import jinja2
 import yaml
 
 from filtercake.errors import ConfigError, FiltercakeError, Problem, shown
+
+if TYPE_CHECKING:
+    import jinja2
 
 LARGEST_YAML: Final = 200_000
 """Bytes of a configuration file beyond which it is surely not one."""
@@ -133,6 +135,8 @@ def read_yaml(path: Path) -> Any:
 
 def templates(folder: Path, *, html: bool = False) -> jinja2.Environment:
     """Return the templates of a folder, in which a name without a value is an error; values in HTML are escaped."""
+    import jinja2  # most who read a file fill no template
+
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),
         undefined=jinja2.StrictUndefined,

@@ -219,8 +219,8 @@ def run_command(words: list[str]) -> None:
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True) for _ in range(2))
     rejected = PackingRejected(["nothing is packed here"])
     with (
-        mock.patch.object(importlib.import_module("filtercake.api.pack"), "pack_replicates", side_effect=rejected),
-        mock.patch.object(importlib.import_module("filtercake.api.export"), "pack", side_effect=rejected),
+        mock.patch.object(importlib.import_module("filtercake.api.packings"), "pack_replicates", side_effect=rejected),
+        mock.patch.object(importlib.import_module("filtercake.api.exports"), "pack", side_effect=rejected),
         mock.patch.dict(os.environ, {cli.TRACEBACK_VARIABLE: "1"}),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),

@@ -7,8 +7,7 @@ import time
 from dataclasses import replace
 from functools import cache
 
-import pandas as pd
-from filtercake.crystals.csd import from_table
+from filtercake.crystals.csd import read_tables
 from filtercake.figures import catalogue
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST, count_kept, point_key
@@ -259,7 +258,7 @@ def missing_packings(study, point):
     packings = folder / "packings" / point.name
     if not (packings.is_dir() and table.is_file()):
         return point.replicates
-    _, csd = from_table(pd.read_csv(table))
+    _, csd = read_tables([table])[point.csd]
     key = point_key(packing_code(point.scene.engine), replace(point.scene, csd=csd))
     return point.replicates - count_kept(packings, key, point.replicates)
 

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from filtercake.api.steps import ORIGIN
+from filtercake.api.arguments import ORIGIN
 from filtercake.design.costs import costs_side_by_side, load_correlations
 from filtercake.errors import ConfigError, Problem
 from filtercake.study.config.values import TO_NUMBER, Model, Name, PathText
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 
 SIZE_OF = {"m2": "filter_area_m2", "m3": "crystallizer_volume_m3", "kg/s": "crystals_kg_s"}
 """Argument that holds the size of equipment, by its unit."""

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from filtercake.api.steps import MILLIMETRE, ORIGIN, OUT_OF_REACH
+from filtercake.api.arguments import MILLIMETRE, ORIGIN, OUT_OF_REACH
 from filtercake.errors import ConfigError, FilterError, Problem
 from filtercake.filtration.batch_filter import (
     NO_LIMIT,
@@ -34,7 +34,7 @@ from filtercake.filtration.deliquoring import (
     time_to_moisture,
 )
 from filtercake.study.config.values import TO_NUMBER, Density, Model
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE
 
 MILLINEWTON_PER_METRE = 1e-3

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from filtercake.api.steps import ORIGIN
+from filtercake.api.arguments import ORIGIN
 from filtercake.calibration.measurements import FiltrationConditions, filtration_test_of, load_measurements, said
 from filtercake.filtration.analysis import FiltrationAnalysis, analyse
 from filtercake.filtration.constant_pressure import FiltrationTest
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 
 
 @dataclass(frozen=True)

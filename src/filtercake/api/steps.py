@@ -9,56 +9,33 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import pandas as pd
-from pydantic import Field, model_validator
+from pydantic import Field
 
+from filtercake.api.arguments import ORIGIN, OUT_OF_REACH, SOURCES
 from filtercake.crystals.crystallizer import SteadyState
 from filtercake.crystals.csd import CrystalSizeDistribution, kept_volume
-from filtercake.errors import ConfigError, CsdError, FilterError, PackingRejected, Problem
-from filtercake.filtration.drum_filter import (
-    area,
-    cake_mass_per_area,
-    cake_thickness,
-    capacity,
-    forming_warning,
-    medium_share,
-    on_filtrate_basis,
-)
+from filtercake.errors import ConfigError, Problem
 from filtercake.filtration.resistance import CARMAN, KozenyConstant, law_of, log_sensitivity
-from filtercake.filtration.safety import design_resistance
 from filtercake.packing.cloud import NARROW_PARTICLES
-from filtercake.packing.porosity import measure, porosity_profile
-from filtercake.packing.result import Packing
-from filtercake.packing.scene import Scene
-from filtercake.packing.slab import bed_height
-from filtercake.results.filter_design import drum_filter
 from filtercake.results.resistance_columns import ALWAYS, LAW_CI95, resistance_columns
 from filtercake.study.config.crystals import Lognormal, RosinRammler
-from filtercake.study.config.filter import Filter
 from filtercake.study.config.values import TO_NUMBER, Density, LawName, Model
 from filtercake.study.limits import unit_problems
-from filtercake.study.loading import LoadedStudy, check_study, parse
-from filtercake.units import HOUR, MICROMETRE
+from filtercake.study.loading import LoadedStudy, check_study
+from filtercake.study.parsing import parse
+from filtercake.units import MICROMETRE
 
-ORIGIN = Path("options")
-"""Stands for the study file in messages about arguments; files that arguments name are looked up from here."""
 CSD = "csd"
 """Name of the distribution in the study of one point."""
-SOURCES = ("mixture", "file", "lognormal", "rosin_rammler", "kinetics")
-"""What a distribution may come from."""
 CRYSTALLIZER_OPTIONS = ("kinetics", "kinetics_file", "slurry_concentration_kg_m3", "bin_width_um")
 PLAIN_DENSITY = 1000.0
 """Density, kg/m3, for checking a distribution on its own: nothing about its sizes follows from it, or from the spheres
 that a bed of it needs."""
-SLICES_PER_DIAMETER = 20
 LARGEST_RESISTANCE = 1e100
 """m/kg; beyond, squares leave floating point."""
-OUT_OF_REACH = "a number is too small or too large to compute with"
-MILLIMETRE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -121,73 +98,6 @@ class Resistance:
     change_per_0p01_porosity: float
 
 
-@dataclass(frozen=True)
-class FilterSize:
-    """A rotary drum filter and the slurry it takes.
-
-    Attributes
-    ----------
-    filter_area_m2, slurry_flow_m3_h : float
-        Area, m2, and slurry flow, m3/h.
-    medium_share : float
-        Share of the medium in the overall resistance.
-    cake_mass_kg_m2 : float
-        Crystals on the drum per area and revolution, kg/m2.
-    cake_thickness_mm : float or None
-        Thickness of the cake, mm, where porosity and crystal density are given.
-    filter_area_upper_m2, filter_area_paper_factor_m2 : float or None
-        Areas at the upper end of the resistance's 95 % interval and at twice the resistance, the paper's safety factor,
-        m2; None where the interval is not given.
-    safety : str
-        Which of the two asks for more, in words; empty where the interval is not given.
-    warnings : tuple of str
-        What speaks against a continuous filter, where porosity and crystal density are given.
-    """
-
-    filter_area_m2: float
-    slurry_flow_m3_h: float
-    medium_share: float
-    cake_mass_kg_m2: float
-    cake_thickness_mm: float | None
-    filter_area_upper_m2: float | None = None
-    filter_area_paper_factor_m2: float | None = None
-    safety: str = ""
-    warnings: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class PackingPorosity:
-    """Porosities of one packing.
-
-    Attributes
-    ----------
-    porosity : float
-        Exact, in the interior of the bed: the answer. Of a pressed cell, that of rigid spheres under the last load.
-    porosity_from_floor : float or None
-        Exact, from the floor up, the layer ordered by the floor included; None without a floor.
-    porosity_paper_count : float or None
-        The paper's estimate: spheres counted whole by centre; None without a floor.
-    soft_contact_compaction : float
-        Estimated loss of porosity because contacts overlap.
-    interior_from_um, interior_to_um, bed_height_um : float
-        Heights, um.
-    particles : int
-        Number of spheres.
-    engine : str
-        Name of the engine.
-    """
-
-    porosity: float
-    porosity_from_floor: float | None
-    porosity_paper_count: float | None
-    soft_contact_compaction: float
-    interior_from_um: float
-    interior_to_um: float
-    bed_height_um: float
-    particles: int
-    engine: str
-
-
 class ResistanceOptions(Model):
     """Arguments of :func:`resistance`, besides the distribution."""
 
@@ -216,51 +126,6 @@ class ResistanceOptions(Model):
         default=1.0, description="Sphericity of the crystals."
     )
     trust_units: bool = Field(default=False, description="Take density and sizes as they are, however unlikely.")
-
-
-class FilterOptions(Filter):
-    """Arguments of :func:`filter_area`."""
-
-    resistance_m_kg: Annotated[float, Field(ge=0, le=1e20, allow_inf_nan=False), TO_NUMBER] = Field(
-        description="Specific resistance of the cake, m/kg."
-    )
-    slurry_concentration_kg_m3: Annotated[float, Field(ge=0.001, le=2000, allow_inf_nan=False), TO_NUMBER] = Field(
-        description="Crystals in the slurry, kg/m3 (= g/L)."
-    )
-    slurry_flow_m3_h: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
-        default=None, description="Slurry to be filtered, m3/h: gives the area it needs."
-    )
-    filter_area_m2: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), TO_NUMBER] | None = Field(
-        default=None, description="Area of a filter, m2, instead of the flow: gives the flow it can take."
-    )
-    porosity: Annotated[float, Field(ge=0.001, le=0.999, allow_inf_nan=False), TO_NUMBER] | None = Field(
-        default=None, description="Porosity of the cake, for its thickness; goes with density_kg_m3."
-    )
-    density_kg_m3: Density | None = Field(
-        default=None, description="Crystal density, kg/m3, for the cake's thickness; goes with porosity."
-    )
-    filtrate_basis: bool = Field(
-        default=False,
-        description="Count as filtrate what passes the cake, and not all of the slurry as the paper does; goes with "
-        "porosity and density_kg_m3.",
-    )
-    resistance_ci95_m_kg: Annotated[float, Field(ge=0, le=1e20, allow_inf_nan=False), TO_NUMBER] | None = Field(
-        default=None,
-        description="Half-width of the resistance's 95 % interval, m/kg, for the areas with safety; goes with "
-        "slurry_flow_m3_h.",
-    )
-
-    @model_validator(mode="after")
-    def _one_way(self) -> FilterOptions:
-        if (self.slurry_flow_m3_h is None) == (self.filter_area_m2 is None):
-            raise ValueError("needs exactly one of slurry_flow_m3_h and filter_area_m2")
-        if (self.porosity is None) != (self.density_kg_m3 is None):
-            raise ValueError("porosity and density_kg_m3 go together")
-        if self.filtrate_basis and self.porosity is None:
-            raise ValueError("filtrate_basis needs porosity and density_kg_m3")
-        if self.resistance_ci95_m_kg is not None and self.slurry_flow_m3_h is None:
-            raise ValueError("resistance_ci95_m_kg goes with slurry_flow_m3_h")
-        return self
 
 
 def distribution(**options: Any) -> Distribution:
@@ -363,111 +228,6 @@ def _resistance(given: ResistanceOptions, found: Mapping[str, Any]) -> Resistanc
         resistance_law_ci95_m_kg=law_half if math.isfinite(law_half) else None,
         change_per_0p01_porosity=0.01 * sensitivity,
     )
-
-
-def filter_area(**options: Any) -> FilterSize:
-    """Area of a rotary drum filter for a slurry flow, or the flow that an area can take (paper, eq. 10).
-
-    Parameters
-    ----------
-    **options
-        The keys of the configuration's ``filter`` block; ``resistance_m_kg``, ``slurry_concentration_kg_m3``; exactly
-        one of ``slurry_flow_m3_h`` and ``filter_area_m2``; ``porosity`` and ``density_kg_m3`` for the cake's thickness,
-        and with them ``filtrate_basis``; ``resistance_ci95_m_kg`` for the areas with safety.
-
-    Raises
-    ------
-    ConfigError, FilterError
-        With every problem.
-    """
-    given = parse(FilterOptions, options, str(ORIGIN))
-    try:
-        with np.errstate(all="ignore"):
-            found = _size(given)
-    except (ZeroDivisionError, OverflowError):
-        raise FilterError(OUT_OF_REACH) from None
-    if not (math.isfinite(found.filter_area_m2) and math.isfinite(found.slurry_flow_m3_h)):
-        raise FilterError(OUT_OF_REACH)
-    return found
-
-
-def porosity(npz: str | Path) -> PackingPorosity:
-    """Measure a packing's porosity; its record (``.json``) lies beside the ``npz`` file.
-
-    Raises
-    ------
-    PackingRejected
-        If a file is missing, damaged, not what was accepted, or the bed has no interior.
-    """
-    packing, scene = load_packing(Path(npz))
-    try:
-        found = measure(packing, scene)
-    except ValueError as error:
-        raise PackingRejected([f"{npz}: {error}; use more particles"]) from None
-    return PackingPorosity(
-        porosity=found.interior,
-        porosity_from_floor=None if packing.is_cell else found.from_floor,
-        porosity_paper_count=None if packing.is_cell else found.paper_count,
-        soft_contact_compaction=found.compaction,
-        interior_from_um=found.slab.lower / MICROMETRE,
-        interior_to_um=found.slab.upper / MICROMETRE,
-        bed_height_um=(packing.length if packing.is_cell else bed_height(packing.position, packing.radius))
-        / MICROMETRE,
-        particles=int(packing.radius.size),
-        engine=scene.engine,
-    )
-
-
-def profile(npz: str | Path, slices_per_diameter: int = SLICES_PER_DIAMETER) -> pd.DataFrame:
-    """Tabulate a packing's porosity over height, in exact slices from the floor to the topmost sphere.
-
-    The columns are height_um (of a slice's middle) and porosity; errors are those of :func:`porosity`. A pressed cell
-    is cut from its lower face to the upper one, with what reaches in from beyond.
-    """
-    packing, _ = load_packing(Path(npz))
-    if packing.is_cell:
-        packing = _stacked(packing)
-    top = packing.length if packing.is_cell else float((packing.position[:, 2] + packing.radius).max())
-    slices = max(1, math.ceil(top * slices_per_diameter / (2.0 * float(packing.radius.max()))))
-    edges = np.linspace(0.0, top, slices + 1)
-    values = porosity_profile(packing.position, packing.radius, packing.length, edges)
-    return pd.DataFrame({"height_um": 0.5 * (edges[1:] + edges[:-1]) / MICROMETRE, "porosity": values})
-
-
-def _stacked(packing: Packing) -> Packing:
-    """Put a cell's spheres that reach through its lower or upper face beyond the other one as well."""
-    lifts = packing.length * np.array([0.0, 1.0, -1.0])
-    position = np.concatenate([packing.position + np.array([0.0, 0.0, lift]) for lift in lifts])
-    radius = np.tile(packing.radius, lifts.size)
-    inside = (position[:, 2] + radius > 0.0) & (position[:, 2] - radius < packing.length)
-    return replace(packing, position=position[inside], radius=radius[inside])
-
-
-def load_packing(npz: Path) -> tuple[Packing, Scene]:
-    """Read a packing and what it is made of, and make sure that it is one.
-
-    Raises
-    ------
-    PackingRejected
-        If a file is missing, damaged, or not what was accepted.
-    """
-    if not npz.name:
-        raise PackingRejected([f"{str(npz)!r} is not the name of a packing's file"])
-    try:
-        packing = Packing.load(npz)
-    except PackingRejected as error:
-        raise PackingRejected([f"{npz.parent}: {error}"]) from None
-    try:
-        scene = Scene.from_dict(packing.diagnostics["scene"])
-    except KeyError:
-        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed (no scene)"]) from None
-    except (CsdError, OverflowError, TypeError, ValueError) as error:
-        raise PackingRejected([f"{npz.with_suffix('.json')} does not say what was packed: {error}"]) from None
-    n = packing.radius.size
-    sound = n > 0 and packing.radius.shape == (n,) and packing.position.shape == (n, 3) and packing.length > 0.0
-    if not (sound and np.isfinite(packing.position).all() and (packing.radius > 0.0).all()):
-        raise PackingRejected([f"{npz} does not hold a packing"])
-    return packing, scene
 
 
 def load(
@@ -578,35 +338,6 @@ def _check_sums(study: LoadedStudy) -> None:
     if not (np.isfinite(csd.number_fraction).all() and np.isfinite(sums**2).all() and (sums**2 > 0.0).all()):
         shown = f"{csd.smallest / MICROMETRE:g} to {csd.largest / MICROMETRE:g} um"
         raise ConfigError([_problem("distribution", shown, "sizes are too small or too far apart to compute with")])
-
-
-def _size(given: FilterOptions) -> FilterSize:
-    drum, alpha = drum_filter(given, given.slurry_concentration_kg_m3), given.resistance_m_kg
-    thickness, warning = None, None
-    if given.porosity is not None and given.density_kg_m3 is not None:
-        if given.filtrate_basis:
-            drum = on_filtrate_basis(drum, given.porosity, given.density_kg_m3)
-        thickness = float(cake_thickness(drum, alpha, given.porosity, given.density_kg_m3)) / MILLIMETRE
-        warning = forming_warning(drum, alpha, given.porosity, given.density_kg_m3)
-    if given.slurry_flow_m3_h is not None:
-        flow = given.slurry_flow_m3_h
-        needed = float(area(drum, alpha, flow / HOUR))
-    else:
-        needed = given.filter_area_m2 or 0.0  # the model lets one of the two pass
-        flow = float(capacity(drum, alpha, needed)) * HOUR
-    found = FilterSize(
-        filter_area_m2=needed,
-        slurry_flow_m3_h=flow,
-        medium_share=float(medium_share(drum, alpha)),
-        cake_mass_kg_m2=float(cake_mass_per_area(drum, alpha)),
-        cake_thickness_mm=thickness,
-        warnings=() if warning is None else (warning,),
-    )
-    if given.resistance_ci95_m_kg is None:
-        return found
-    asked = design_resistance(alpha, given.resistance_ci95_m_kg)
-    upper, paper = (float(area(drum, resistance, flow / HOUR)) for resistance in (asked.upper, asked.paper))
-    return replace(found, filter_area_upper_m2=upper, filter_area_paper_factor_m2=paper, safety=asked.words())
 
 
 def _problem(key: str, value: str, allowed: str) -> Problem:

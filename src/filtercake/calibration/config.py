@@ -48,7 +48,8 @@ from filtercake.study.config.values import (
     PathText,
 )
 from filtercake.study.limits import DOUBTFUL_RELATIVE_OVERLAP, LARGEST_RELATIVE_OVERLAP, refusals, small_beds
-from filtercake.study.loading import LoadedStudy, find_studies, load_study, parse
+from filtercake.study.loading import LoadedStudy, find_studies, load_study
+from filtercake.study.parsing import parse
 from filtercake.study.points import ChooseEngine, expand
 from filtercake.study.scenes import scene_of
 from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, tidy

@@ -8,10 +8,9 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 
 import numpy as np
-import pandas as pd
 from pydantic import Field, model_validator
 
 from filtercake.calibration.pooling import chi_square, improbable, scatter
@@ -28,9 +27,12 @@ from filtercake.filtration.constant_pressure import (
 )
 from filtercake.statistics import quantile
 from filtercake.study.config.values import MOST_VALUES, TO_NUMBER, TO_TEXT, Model, Name, PathText
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, NUMBER, FloatArray, IntArray
 from filtercake.user_files import Unusable, read_text, read_yaml
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TIME_UNITS: Final[dict[str, float]] = {"s": 1.0, "min": MINUTE, "h": HOUR}
 MASS_UNITS: Final[dict[str, float]] = {"kg": 1.0, "g": 1e-3, "mg": 1e-6}
@@ -397,6 +399,8 @@ def fits_table(measurements: Measurements) -> pd.DataFrame:
     DataFrame
         The columns of ``FIT_COLUMNS``, two rows per test; notes on readings and fit are joined by ``"; "``.
     """
+    import pandas as pd  # who looks at one test needs no table
+
     rows = [
         (
             test.name,
@@ -426,6 +430,8 @@ def compressibility_table(measurements: Measurements) -> pd.DataFrame:
         The columns of ``COMPRESSIBILITY_COLUMNS``: resistance and 95 % interval at the reference pressure, exponent and
         half-width (blank where two points determine it); notes are joined by ``"; "``.
     """
+    import pandas as pd
+
     rows = [
         (
             csd,
@@ -785,7 +791,9 @@ def _merged(path: Path, rows: _Rows, clock: _Clock) -> tuple[_Rows, list[str]]:
     if time.size == rows.time.size:
         return rows, []
     volume = np.bincount(where, weights=rows.volume) / count
-    _require_alike(path, rows, clock.resolution * _flow(time, volume)[where])
+    largest = np.full(time.size, -np.inf)
+    np.maximum.at(largest, where, rows.volume)
+    _require_alike(path, rows, largest[where], clock.resolution * _flow(time, volume)[where])
     again = rows.line[np.concatenate([[False], np.diff(rows.time) == 0.0])]
     note = f"{_lines_text(again)}: read at the same time as the line before, volumes averaged"
     return _Rows(rows.line[first], time, volume), [note]
@@ -798,9 +806,8 @@ def _flow(time: FloatArray, volume: FloatArray) -> FloatArray:
     return np.abs(np.gradient(volume, time))
 
 
-def _require_alike(path: Path, rows: _Rows, step: FloatArray) -> None:
-    """Refuse volumes of one time that differ too much; ``step`` is what flows while the clock shows the same."""
-    largest = pd.Series(rows.volume).groupby(rows.time).transform("max").to_numpy(np.float64)
+def _require_alike(path: Path, rows: _Rows, largest: FloatArray, step: FloatArray) -> None:
+    """Refuse volumes that differ too much from the largest of their time, beyond what flows while the clock stands."""
     allowed = np.maximum(np.maximum(SAME_TIME * largest, BALANCE_RESOLUTION * rows.volume.max()), STAMPED * step)
     apart = (rows.time > 0.0) & (largest - rows.volume > allowed)
     if apart.any():

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from filtercake.units import FloatArray
@@ -71,6 +70,8 @@ def scatter(values: ArrayLike, errors: ArrayLike) -> float:
     values, errors : array_like, shape (m,)
         The measurements and their standard errors.
     """
+    from scipy import optimize
+
     value, error = _arrays(values, errors)
     freedom = value.size - 1
     if freedom == 0 or _squares(value, error) <= freedom:
@@ -78,13 +79,15 @@ def scatter(values: ArrayLike, errors: ArrayLike) -> float:
     # the squares fall as the scatter grows, and are below the degrees of freedom once it is the whole spread
     widest = 1.01 * float(np.ptp(value))
     return float(
-        scipy.optimize.brentq(lambda added: _squares(value, np.hypot(error, added)) - freedom, 0.0, widest, rtol=1e-12)
+        optimize.brentq(lambda added: _squares(value, np.hypot(error, added)) - freedom, 0.0, widest, rtol=1e-12)
     )
 
 
 def improbable(chi_square: float, degrees_of_freedom: int) -> bool:
     """Whether errors alone would give so large a sum of squares only with the probability ``MISFIT`` or less."""
-    return degrees_of_freedom > 0 and bool(scipy.special.chdtrc(degrees_of_freedom, chi_square) < MISFIT)
+    from scipy import special
+
+    return degrees_of_freedom > 0 and bool(special.chdtrc(degrees_of_freedom, chi_square) < MISFIT)
 
 
 def chi_square(values: ArrayLike, errors: ArrayLike) -> float:

@@ -1,4 +1,4 @@
-"""The command line: one module of commands, one of options, and the schemas of the configuration files.
+"""The command line: one module of commands, one of options, fields of the model in words, and the generated schemas.
 
 Imports from every room but validation.
 """

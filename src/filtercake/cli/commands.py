@@ -1,37 +1,27 @@
-"""The command line: the steps of a study on files and numbers, without Snakemake."""
+"""The command line: the steps of a study on files and numbers, without Snakemake.
+
+A command imports what it needs when it is asked for: ``--help`` and a formula need not wait for what packs and draws.
+"""
 
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-import pandas as pd
-
-from filtercake import __version__, api
-from filtercake.calibration.measurements import FiltrationConditions
+from filtercake import api
 from filtercake.cli import options as words
-from filtercake.cli.schema import study_template
-from filtercake.crystals.csd import to_table
 from filtercake.errors import CloudError, EngineError, EngineMissing, FiltercakeError, PackingRejected, visible
-from filtercake.filtration.resistance import RESISTANCE_LAWS
-from filtercake.packing.result import publish
-from filtercake.results.resistance_columns import others
-from filtercake.statistics import half_width
-from filtercake.study import engine_choice
-from filtercake.study.config.material import Material
-from filtercake.study.config.packing import Packing
-from filtercake.study.estimate import estimate
-from filtercake.study.loading import load_study
-from filtercake.study.points import expand, packed
-from filtercake.units import HOUR, MICROMETRE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 USER_ERROR = 2
 FAILED = 1
@@ -40,7 +30,6 @@ TRACEBACK_VARIABLE = "FILTERCAKE_TRACEBACK"
 
 Line = tuple[str, Any, str]
 """Name, value and unit of one number."""
-Command = Callable[[argparse.Namespace], int]
 
 EXAMPLES = {
     "template": "filtercake template --output mine.yaml",
@@ -81,10 +70,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     The exit status is 0 where all went well, 1 where no packing was accepted, 2 where the command or its input is
     wrong.
     """
-    parser = build_parser()
+    arguments = sys.argv[1:] if argv is None else argv
+    parser = build_parser(arguments)
     options = argparse.Namespace()
     try:
-        options, rest = parser.parse_known_args(argv)
+        options, rest = parser.parse_known_args(arguments)
         if rest:
             known = vars(options).keys() - {"run", "command"}
             raise words.UsageError(f"{words.unknown(rest, map(words.flag, known))} (see {options.prog} --help)")
@@ -110,63 +100,59 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _complain(" ".join(text.split()), FAILED)
 
 
-def build_parser() -> words.Parser:
-    """Build the parser of all commands."""
+def build_parser(asked: Collection[str] | None = None) -> words.Parser:
+    """Build the parser of all commands.
+
+    Parameters
+    ----------
+    asked : collection of str, optional
+        Commands that get their options, all if left out: what makes the options of a command takes longest to import.
+    """
     parser = words.Parser(
         prog="filtercake",
         description="Porosity and specific resistance of filter cakes from crystal size distributions.",
         epilog="Every command: --help for its options with their units, --json for one JSON object.",
     )
-    parser.add_argument("--version", action="version", version=f"filtercake {__version__}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    _add_csd(commands)
-    _add_pack(commands)
-    _add_porosity(commands)
-    _add_permeability(commands)
-    _add_resistance(commands)
-    _add_filter_area(commands)
-    _add_filter_batch(commands)
-    _add_deliquor(commands)
-    _add_crystallizer(commands)
-    _add_cost(commands)
-    _add_test(commands)
-    _add_export(commands)
-    _add_rerun(commands)
-    _add_estimate(commands)
-    _add_template(commands)
+    for name, command in COMMANDS.items():
+        one: words.Parser = commands.add_parser(
+            name,
+            help=command.text.replace("%", "%%"),  # argparse formats this one, and takes the description as it is
+            description=command.text,
+            epilog=f"example:\n  {EXAMPLES[name]}",
+        )
+        if asked is None or name in asked:
+            one.set_defaults(run=command.run, prog=one.prog)
+            one.add_argument("--json", action="store_true", help="print one JSON object")
+            command.add_options(one)
     return parser
 
 
-def _command(commands: Any, name: str, run: Command, text: str) -> words.Parser:
-    parser: words.Parser = commands.add_parser(
-        name,
-        help=text.replace("%", "%%"),  # argparse formats this one, and takes the description as it is
-        description=text,
-        epilog=f"example:\n  {EXAMPLES[name]}",
-    )
-    parser.set_defaults(run=run, prog=parser.prog)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    return parser
+class _Version(argparse.Action):
+    """Prints the version, which is not looked up before."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        """Print the version and exit."""
+        from filtercake import __version__
+
+        print(f"filtercake {__version__}")
+        parser.exit()
 
 
-def _add_template(commands: Any) -> None:
-    text = "Write a study with every key, its default and its meaning: the start of a study of your own."
-    parser = _command(commands, "template", _run_template, text)
+def _template_options(parser: words.Parser) -> None:
     parser.add_argument("--output", metavar="YAML", required=True, help="the new file")
 
 
-def _add_csd(commands: Any) -> None:
-    text = "Show a crystal size distribution: its classes, its moments, and how much of it is packed."
-    parser = _command(commands, "csd", _run_csd, text)
+def _csd_options(parser: words.Parser) -> None:
     words.add_source(parser)
     parser.add_argument("--output", metavar="CSV", help="write the classes, full and as packed, to this file")
 
 
-def _add_pack(commands: Any) -> None:
-    text = (
-        "Pack spheres of a size distribution; print porosity and specific cake resistance (m/kg) with 95 % intervals."
-    )
-    parser = _command(commands, "pack", _run_pack, text)
+def _pack_options(parser: words.Parser) -> None:
+    from filtercake.study.config.material import Material
+    from filtercake.study.config.packing import Packing
+
     words.add_source(parser)
     words.add_model(parser.add_argument_group("crystals"), Material)
     words.add_model(parser.add_argument_group("packing"), Packing)
@@ -181,21 +167,14 @@ def _add_pack(commands: Any) -> None:
     parser.add_argument("--replace", action="store_true", help="packings of other options in that folder may be lost")
 
 
-def _add_porosity(commands: Any) -> None:
-    text = "Measure the porosity of packings: in the interior, from the floor, and as the paper counts it."
-    parser = _command(commands, "porosity", _run_porosity, text)
+def _porosity_options(parser: words.Parser) -> None:
     parser.add_argument("packings", nargs="+", metavar="NPZ", help="packing; its record (.json) lies beside it")
     parser.add_argument(
         "--profile", action="store_true", help="porosity over height (um) as well, in slices of 1/20 largest diameter"
     )
 
 
-def _add_permeability(commands: Any) -> None:
-    text = (
-        "Permeability (m2), specific resistance (m/kg) and Kozeny constant of packings, with 95 % intervals, from "
-        "Stokes flow solved in their pores."
-    )
-    parser = _command(commands, "permeability", _run_permeability, text)
+def _permeability_options(parser: words.Parser) -> None:
     parser.add_argument(
         "packings",
         nargs="+",
@@ -207,12 +186,7 @@ def _add_permeability(commands: Any) -> None:
     words.add_model(parser.add_argument_group("flow and solid"), api.PermeabilityOptions)
 
 
-def _add_resistance(commands: Any) -> None:
-    text = (
-        "Specific cake resistance (m/kg) from porosity and size distribution by a law, with both parts of its 95 % "
-        "interval: the porosity's and the law's."
-    )
-    parser = _command(commands, "resistance", _run_resistance, text)
+def _resistance_options(parser: words.Parser) -> None:
     words.add_source(parser)
     words.add_model(parser.add_argument_group("cake"), api.ResistanceOptions)
     parser.add_argument(
@@ -220,49 +194,30 @@ def _add_resistance(commands: Any) -> None:
     )
 
 
-def _add_filter_area(commands: Any) -> None:
-    text = "Area of a rotary drum filter (m2) for a slurry flow (m3/h), or the flow that an area can take."
-    parser = _command(commands, "filter-area", _run_filter_area, text)
+def _filter_area_options(parser: words.Parser) -> None:
     words.add_model(parser.add_argument_group("filter and slurry"), api.FilterOptions)
 
 
-def _add_filter_batch(commands: Any) -> None:
-    text = (
-        "Area of a batch filter (Nutsche, leaf, press; m2) for a slurry flow (m3/h), or the flow that an area takes; "
-        "its cycle, and the cake height of most cake per time."
-    )
-    parser = _command(commands, "filter-batch", _run_filter_batch, text)
+def _filter_batch_options(parser: words.Parser) -> None:
     words.add_model(parser.add_argument_group("filter, cake and slurry"), api.BatchFilterOptions)
 
 
-def _add_deliquor(commands: Any) -> None:
-    text = "Moisture of a cake after some time (min) of deliquoring by gas, or the time that a moisture takes."
-    parser = _command(commands, "deliquor", _run_deliquor, text)
+def _deliquor_options(parser: words.Parser) -> None:
     words.add_model(parser.add_argument_group("cake, liquor and gas"), api.DeliquoringOptions)
 
 
-def _add_crystallizer(commands: Any) -> None:
-    text = (
-        "Product of a continuous crystallizer: mixed, with fines dissolution and classified removal (sizes in um), or "
-        "a cascade (values of its stages with commas between)."
-    )
-    parser = _command(commands, "crystallizer", _run_crystallizer, text)
+def _crystallizer_options(parser: words.Parser) -> None:
     words.add_model(parser.add_argument_group("crystallizer"), api.CrystallizerOptions)
     parser.add_argument("--output", metavar="CSV", help="write the product's classes to this file")
 
 
-def _add_cost(commands: Any) -> None:
-    text = "What a filter (size in m2) or crystallizer (m3, or kg/s) costs, by every correlation that there is of it."
-    parser = _command(commands, "cost", _run_cost, text)
+def _cost_options(parser: words.Parser) -> None:
     words.add_model(parser.add_argument_group("equipment"), api.CostOptions)
 
 
-def _add_test(commands: Any) -> None:
-    text = (
-        "Specific cake resistance (m/kg) and medium resistance (1/m) of a filtration test at constant pressure, with "
-        "95 % intervals; which readings were left out, and why."
-    )
-    parser = _command(commands, "test", _run_test, text)
+def _test_options(parser: words.Parser) -> None:
+    from filtercake.calibration.measurements import FiltrationConditions
+
     parser.add_argument(
         "file",
         metavar="FILE",
@@ -272,9 +227,7 @@ def _add_test(commands: Any) -> None:
     words.add_model(parser.add_argument_group("test, for a CSV"), FiltrationConditions)
 
 
-def _add_export(commands: Any) -> None:
-    text = "Write one packing of a study to a folder that stands alone: deck, cloud, seeds, versions, log, a README."
-    parser = _command(commands, "export", _run_export, text)
+def _export_options(parser: words.Parser) -> None:
     parser.add_argument("study", metavar="STUDY", help="name of a file in config/studies, or the path of a study file")
     parser.add_argument("point", metavar="POINT", help="name of the point: column point of summary.csv")
     parser.add_argument("--replicate", metavar="K", help="which packing, from 0. Default: the first that failed, or 0")
@@ -284,29 +237,30 @@ def _add_export(commands: Any) -> None:
     parser.add_argument("--output", metavar="FOLDER", required=True, help="the new folder")
 
 
-def _add_rerun(commands: Any) -> None:
-    text = "Make an exported packing once more, and print its porosity beside the first one's."
-    parser = _command(commands, "rerun", _run_rerun, text)
+def _rerun_options(parser: words.Parser) -> None:
     parser.add_argument("folder", metavar="FOLDER", help="what filtercake export wrote")
 
 
-def _add_estimate(commands: Any) -> None:
-    text = "Estimate what a study will cost before it is made: core-hours, wall time, disk."
-    parser = _command(commands, "estimate", _run_estimate, text)
+def _estimate_options(parser: words.Parser) -> None:
     parser.add_argument("study", metavar="STUDY", help="path of a study file")
     parser.add_argument("--cores", metavar="N", default="1", help="cores that are kept busy. Default: 1")
     parser.add_argument("--cluster", action="store_true", help="each point is started on a node of a cluster")
 
 
 def _run_template(options: argparse.Namespace) -> int:
+    from filtercake.cli.schema import study_template
+
     with Path(options.output).open("x", encoding="utf-8") as stream:
         stream.write(study_template())
     return _print_json({"file": options.output}) if options.json else 0
 
 
 def _run_csd(options: argparse.Namespace) -> int:
+    from filtercake.crystals.csd import columns
+    from filtercake.units import MICROMETRE
+
     found = api.distribution(**words.source(options))
-    table = to_table(found.full, found.truncated)
+    table = columns(found.full, found.truncated)
     if options.output is not None:
         _write_csv(table, options.output)
     full, packed = found.full, found.truncated
@@ -321,11 +275,14 @@ def _run_csd(options: argparse.Namespace) -> int:
         "kept_volume_fraction": found.kept_volume_fraction,
     }
     if options.json:
-        return _print_json({"understood": full.understood, "classes": table.to_dict("records"), **values})
+        classes = [dict(zip(table, row, strict=True)) for row in _rows(table)]
+        return _print_json({"understood": full.understood, "classes": classes, **values})
     if full.understood:
         print(f"{options.file or 'distribution'}: {full.understood}\n")
+    shown = ("size_um", "volume_fraction", "number_fraction", "truncated_volume_fraction")
     _print_table(
-        ["size, um", "volume fraction", "number fraction", "packed volume fraction"], table.iloc[:, [0, 1, 2, 5]]
+        ["size, um", "volume fraction", "number fraction", "packed volume fraction"],
+        _rows({name: table[name] for name in shown}),
     )
     print()
     return _print_lines(
@@ -341,12 +298,21 @@ def _run_csd(options: argparse.Namespace) -> int:
     )
 
 
-def _write_csv(table: pd.DataFrame, output: str) -> None:
+def _rows(columns: Mapping[str, NDArray[Any]]) -> Iterator[tuple[Any, ...]]:
+    """Rows of a table given by its columns."""
+    return zip(*(values.tolist() for values in columns.values()), strict=True)
+
+
+def _write_csv(columns: Mapping[str, NDArray[Any]], output: str) -> None:
+    from filtercake.packing.result import publish
+
     target = Path(output)
     if not target.name:
         raise words.UsageError(f"--output = {output!r}: must be the name of a file")
-    with publish(target) as temporary:
-        table.to_csv(temporary, index=False)
+    with publish(target) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(_rows(columns))
 
 
 def _say_understood(options: argparse.Namespace, source: api.Distribution) -> None:
@@ -356,6 +322,9 @@ def _say_understood(options: argparse.Namespace, source: api.Distribution) -> No
 
 
 def _run_pack(options: argparse.Namespace) -> int:
+    from filtercake.study.config.material import Material
+    from filtercake.study.config.packing import Packing
+
     source = api.distribution(**words.source(options))
     asked = words.given(options, ("law", *Material.model_fields, *Packing.model_fields))
     found = api.pack(source, options.output, say=_say, replace=options.replace, **asked)
@@ -389,6 +358,8 @@ def _known(name: str, value: float | None, unit: str = "") -> list[Line]:
 
 def _resistances(found: dict[str, Any], interval: str) -> list[Line]:
     """Resistance by a law with both parts of its interval, of which the first is in words, and by laws beside it."""
+    from filtercake.results.resistance_columns import others
+
     law, by_law = found["resistance_law"], found["resistance_law_ci95_m_kg"]
     return [
         (f"resistance, {law}", found["resistance_m_kg"], interval),
@@ -428,16 +399,18 @@ def _run_porosity(options: argparse.Namespace) -> int:
             ]
         )
         if profiles:
-            _print_table(["height, um", "porosity"], profiles[k])
+            _print_table(["height, um", "porosity"], profiles[k].itertuples(index=False))
     if len(found) > 1:
         print(f"mean of {len(found)}: {_number(mean)} +- {_number(half)} (95 %)")
     return 0
 
 
 def _run_permeability(options: argparse.Namespace) -> int:
+    from filtercake.statistics import half_width
+
     asked = words.given(options, api.PermeabilityOptions.model_fields)
     found = api.permeabilities(options.packings, say=_say, **asked)
-    between = half_width(np.array([item.kozeny_constant for item in found]))
+    between = half_width([item.kozeny_constant for item in found])
     mean = api.mean_kozeny_constant(found)
     half = mean.value * mean.relative_ci95
     if options.json:
@@ -475,9 +448,7 @@ def _print_permeability(found: api.PackingPermeability) -> None:
     levels = [
         [level.nodes_per_sauter_mean, level.permeability_m2, level.fluid_nodes, level.steps] for level in found.levels
     ]
-    _print_table(
-        ["nodes per mean diameter", "permeability, m2", "fluid nodes", "steps"], pd.DataFrame(levels, dtype=object)
-    )
+    _print_table(["nodes per mean diameter", "permeability, m2", "fluid nodes", "steps"], levels)
 
 
 def _run_resistance(options: argparse.Namespace) -> int:
@@ -499,6 +470,8 @@ def _run_resistance(options: argparse.Namespace) -> int:
 
 
 def _list_laws(options: argparse.Namespace) -> int:
+    from filtercake.filtration.resistance import RESISTANCE_LAWS
+
     names = ("name", "title", "equation", "units", "validity", "accuracy", "source")
     laws = [{name: getattr(law, name) for name in names} for law in RESISTANCE_LAWS.values()]
     if options.json:
@@ -573,11 +546,12 @@ def _run_deliquor(options: argparse.Namespace) -> int:
 
 
 def _run_crystallizer(options: argparse.Namespace) -> int:
+    from filtercake.units import MICROMETRE
+
     found = api.crystallizer(**words.given(options, api.CrystallizerOptions.model_fields))
     csd = found.csd
     if options.output is not None:
-        table = pd.DataFrame({"size_um": csd.size / MICROMETRE, "volume_fraction": csd.volume_fraction})
-        _write_csv(table, options.output)
+        _write_csv({"size_um": csd.size / MICROMETRE, "volume_fraction": csd.volume_fraction}, options.output)
     values = {
         "sum_x_over_d_1_m": csd.sum_x_over_d,
         "sum_x_over_d2_1_m2": csd.sum_x_over_d2,
@@ -629,6 +603,8 @@ def _run_cost(options: argparse.Namespace) -> int:
 
 
 def _run_test(options: argparse.Namespace) -> int:
+    from filtercake.calibration.measurements import FiltrationConditions
+
     conditions = words.given(options, FiltrationConditions.model_fields)
     if not options.file.endswith((".yaml", ".yml")):
         found = [api.filtration_test(options.file, **conditions)]
@@ -679,6 +655,12 @@ def _run_rerun(options: argparse.Namespace) -> int:
 
 
 def _run_estimate(options: argparse.Namespace) -> int:
+    from filtercake.study import engine_choice
+    from filtercake.study.estimate import estimate
+    from filtercake.study.loading import load_study
+    from filtercake.study.points import expand, packed
+    from filtercake.units import HOUR
+
     asked = options.cores
     if not (asked.isascii() and asked.isdigit() and len(asked) < 10 and int(asked) > 0):
         raise words.UsageError(f"--cores = {asked}: must be a whole number, from 1")
@@ -701,7 +683,9 @@ def _run_estimate(options: argparse.Namespace) -> int:
 
 def _mean(values: list[float]) -> tuple[float, float]:
     """Mean, and half-width of its 95 % interval (nan for one value)."""
-    return math.fsum(values) / len(values), half_width(np.array(values))
+    from filtercake.statistics import half_width
+
+    return math.fsum(values) / len(values), half_width(values)
 
 
 def _complain(text: str, status: int = USER_ERROR) -> int:
@@ -733,14 +717,107 @@ def _print_lines(lines: Iterable[Line]) -> int:
     return 0
 
 
-def _print_table(titles: list[str], table: Any) -> None:
+def _print_table(titles: list[str], rows: Iterable[Sequence[Any]]) -> None:
     print("  ".join(titles))
-    for row in table.itertuples(index=False):
+    for row in rows:
         print("  ".join(f"{_number(value):>{len(title)}}" for title, value in zip(titles, row, strict=True)))
 
 
 def _number(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+class _Command(NamedTuple):
+    """What a command does, in words; what adds its options; what runs it."""
+
+    text: str
+    add_options: Callable[[words.Parser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+COMMANDS: dict[str, _Command] = {
+    "csd": _Command(
+        "Show a crystal size distribution: its classes, its moments, and how much of it is packed.",
+        _csd_options,
+        _run_csd,
+    ),
+    "pack": _Command(
+        "Pack spheres of a size distribution; print porosity and specific cake resistance (m/kg) with 95 % intervals.",
+        _pack_options,
+        _run_pack,
+    ),
+    "porosity": _Command(
+        "Measure the porosity of packings: in the interior, from the floor, and as the paper counts it.",
+        _porosity_options,
+        _run_porosity,
+    ),
+    "permeability": _Command(
+        "Permeability (m2), specific resistance (m/kg) and Kozeny constant of packings, with 95 % intervals, from "
+        "Stokes flow solved in their pores.",
+        _permeability_options,
+        _run_permeability,
+    ),
+    "resistance": _Command(
+        "Specific cake resistance (m/kg) from porosity and size distribution by a law, with both parts of its 95 % "
+        "interval: the porosity's and the law's.",
+        _resistance_options,
+        _run_resistance,
+    ),
+    "filter-area": _Command(
+        "Area of a rotary drum filter (m2) for a slurry flow (m3/h), or the flow that an area can take.",
+        _filter_area_options,
+        _run_filter_area,
+    ),
+    "filter-batch": _Command(
+        "Area of a batch filter (Nutsche, leaf, press; m2) for a slurry flow (m3/h), or the flow that an area takes; "
+        "its cycle, and the cake height of most cake per time.",
+        _filter_batch_options,
+        _run_filter_batch,
+    ),
+    "deliquor": _Command(
+        "Moisture of a cake after some time (min) of deliquoring by gas, or the time that a moisture takes.",
+        _deliquor_options,
+        _run_deliquor,
+    ),
+    "crystallizer": _Command(
+        "Product of a continuous crystallizer: mixed, with fines dissolution and classified removal (sizes in um), or "
+        "a cascade (values of its stages with commas between).",
+        _crystallizer_options,
+        _run_crystallizer,
+    ),
+    "cost": _Command(
+        "What a filter (size in m2) or crystallizer (m3, or kg/s) costs, by every correlation that there is of it.",
+        _cost_options,
+        _run_cost,
+    ),
+    "test": _Command(
+        "Specific cake resistance (m/kg) and medium resistance (1/m) of a filtration test at constant pressure, with "
+        "95 % intervals; which readings were left out, and why.",
+        _test_options,
+        _run_test,
+    ),
+    "export": _Command(
+        "Write one packing of a study to a folder that stands alone: deck, cloud, seeds, versions, log, a README.",
+        _export_options,
+        _run_export,
+    ),
+    "rerun": _Command(
+        "Make an exported packing once more, and print its porosity beside the first one's.",
+        _rerun_options,
+        _run_rerun,
+    ),
+    "estimate": _Command(
+        "Estimate what a study will cost before it is made: core-hours, wall time, disk.",
+        _estimate_options,
+        _run_estimate,
+    ),
+    "template": _Command(
+        "Write a study with every key, its default and its meaning: the start of a study of your own.",
+        _template_options,
+        _run_template,
+    ),
+}
+"""Every command, in the order of the help."""
 
 
 if __name__ == "__main__":

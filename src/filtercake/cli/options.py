@@ -5,29 +5,27 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable, Mapping
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-
-from filtercake.api.steps import ORIGIN, SOURCES
-from filtercake.cli.schema import allowed, meaning
+from filtercake.api.arguments import ORIGIN, SOURCES
 from filtercake.errors import ConfigError, FiltercakeError, Problem, did_you_mean
-from filtercake.study.config.crystals import Crystallizer, Csd
 
-SOURCE_FIELDS: tuple[tuple[type[BaseModel], tuple[str, ...]], ...] = (
-    (Crystallizer, ("kinetics", "kinetics_file", "slurry_concentration_kg_m3")),
-    (Csd, ("residence_time_min",)),
-    (Crystallizer, ("bin_width_um",)),
-    (Csd, ("truncate_below_volume_fraction", "truncate_below_um", "truncate_above_um")),
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+    from pydantic.fields import FieldInfo
+
+SOURCE_FIELDS = (
+    "kinetics",
+    "kinetics_file",
+    "slurry_concentration_kg_m3",
+    "residence_time_min",
+    "bin_width_um",
+    "truncate_below_volume_fraction",
+    "truncate_below_um",
+    "truncate_above_um",
 )
-SOURCE_OPTIONS = (
-    "file",
-    "mixture",
-    "lognormal",
-    "rosin_rammler",
-    *(name for _, names in SOURCE_FIELDS for name in names),
-)
+"""Options of a distribution that are keys of a study's crystallizer, or of its distributions."""
+SOURCE_OPTIONS = ("file", "mixture", "lognormal", "rosin_rammler", *SOURCE_FIELDS)
 SAID_OTHERWISE = {
     "residence_time_min": "Residence time of the crystallizer, min; goes with --kinetics.",
     "kinetics": "Crystallizer's product: a preset (ammonium_alum, potassium_nitrate), or a name in --kinetics-file.",
@@ -63,6 +61,8 @@ def flag(name: str) -> str:
 
 def add_field(group: argparse._ArgumentGroup, name: str, field: FieldInfo, text: str | None = None) -> None:
     """Add the option of a key, with a text instead of the model's; its value stays text, for the model to check."""
+    from filtercake.cli.fields import allowed, meaning
+
     names = dict.fromkeys((flag(name), flag(name).lower()))
     if field.annotation is bool:
         group.add_argument(*names, dest=name, action="store_const", const=True, help=_escape(meaning(field)))
@@ -79,6 +79,8 @@ def add_model(group: argparse._ArgumentGroup, model: type[BaseModel]) -> None:
 
 def add_source(parser: argparse.ArgumentParser) -> None:
     """Add the options that give a size distribution."""
+    from filtercake.study.config.crystals import Crystallizer, Csd
+
     group = parser.add_argument_group(f"size distribution (one of {SOURCES_SHOWN})")
     group.add_argument(
         "file",
@@ -97,10 +99,9 @@ def add_source(parser: argparse.ArgumentParser) -> None:
         metavar="UM,EXPONENT",
         help="Rosin-Rammler by volume: size in um that 36.8 %% is above, exponent",
     )
-    for model, names in SOURCE_FIELDS:
-        for name in names:
-            text = SAID_OTHERWISE.get(name)
-            add_field(group, name, model.model_fields[name], text)
+    fields = {**Crystallizer.model_fields, **Csd.model_fields}
+    for name in SOURCE_FIELDS:
+        add_field(group, name, fields[name], SAID_OTHERWISE.get(name))
 
 
 def given(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
@@ -182,6 +183,8 @@ def _pairs(text: str) -> list[tuple[str, str]]:
 
 
 def _help(name: str, field: FieldInfo, range_: str, instead: str | None) -> str:
+    from filtercake.cli.fields import meaning
+
     text = instead or meaning(field)
     if range_ == "text":
         return text

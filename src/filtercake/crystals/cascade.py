@@ -25,7 +25,6 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import scipy
 
 from filtercake.crystals.crystallizer import BIN_WIDTH, LARGEST_LOGARITHM, Kinetics, steady_state
 from filtercake.crystals.csd import CrystalSizeDistribution
@@ -147,6 +146,8 @@ def _first(kinetics: Kinetics, time: float, slurry: float) -> Stage:
 
 
 def _next(kinetics: Kinetics, before: Stage, time: float, slurry: float) -> Stage:
+    from scipy import optimize
+
     alone = steady_state(kinetics, time, slurry)  # its crystals would all be born here; and it checks the values
     time, slurry = alone.residence_time, alone.slurry_concentration
     if not slurry > before.slurry_concentration:
@@ -174,7 +175,7 @@ def _next(kinetics: Kinetics, before: Stage, time: float, slurry: float) -> Stag
             raise CrystallizerError(
                 f"slurry_concentration_kg_m3 = {slurry:g}: too near that of the stage before to compute a growth rate"
             )
-    root = float(scipy.optimize.brentq(surplus, low, 1.0, xtol=1e-14, rtol=1e-14))
+    root = float(optimize.brentq(surplus, low, 1.0, xtol=1e-14, rtol=1e-14))
     growth, nucleation = rates(root)
     return Stage(growth, nucleation, time, slurry, _after(before.moments, growth * time, nucleation * time))
 
@@ -211,12 +212,14 @@ def _system(stages: Sequence[Stage], scale: float) -> tuple[FloatArray, FloatArr
 
 def _stepped(system: FloatArray, start: FloatArray, at: FloatArray) -> FloatArray:
     """Integrals at ascending places, shape (n, 3); equal steps share one matrix exponential."""
+    from scipy import linalg
+
     state, place, step, found = start, 0.0, math.nan, []
     move = np.eye(start.size)
     for end in at:
         if not math.isclose(end - place, step, rel_tol=1e-9):
             step = float(end - place)
-            move = np.asarray(scipy.linalg.expm(step * system))
+            move = np.asarray(linalg.expm(step * system))
         state, place = move @ state, float(end)
         found.append(state[1 - POWERS :])
     return np.array(found)

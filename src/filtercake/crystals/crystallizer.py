@@ -14,11 +14,9 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
-from filtercake.crystals.csd import CrystalSizeDistribution, discretise
-from filtercake.crystals.instruments import MOST_CLASSES
+from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
 from filtercake.errors import ConfigError, CrystallizerError, Problem, did_you_mean, shown
 from filtercake.units import MICROMETRE, MINUTE, FloatArray
 from filtercake.user_files import read_yaml
@@ -198,7 +196,9 @@ def cumulative_volume(size_scale: float, size: ArrayLike) -> FloatArray:
     Size scale G tau and sizes L in m; a size scale that is not positive and finite, or a size that is negative or not
     finite, raises a CrystallizerError.
     """
-    return np.asarray(scipy.special.gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
+    from scipy import special
+
+    return np.asarray(special.gammainc(4.0, _sizes(size) / _checked("size_scale", size_scale, _positive)))
 
 
 def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -208,9 +208,11 @@ def cumulative_sums(size_scale: float, size: ArrayLike) -> tuple[FloatArray, Flo
 
     Arguments and errors as of :func:`cumulative_volume`.
     """
+    from scipy import special
+
     a = _checked("size_scale", size_scale, _positive)
     scaled = _sizes(size) / a
-    first, second = (scipy.special.gammainc(order, scaled) for order in (3.0, 2.0))
+    first, second = (special.gammainc(order, scaled) for order in (3.0, 2.0))
     return np.asarray(first / (3.0 * a)), np.asarray(second / (6.0 * a**2))
 
 

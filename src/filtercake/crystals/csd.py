@@ -7,18 +7,25 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from filtercake.crystals.instruments import SUM_TOLERANCE, read_classes
 from filtercake.errors import CsdError
 from filtercake.units import MICROMETRE, FloatArray
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 SMALLEST_SIZE, LARGEST_SIZE = 1e-9, 1.0
 """Diameters, m, that a class may have: far beyond what is filtered, and safe to compute with."""
+
+MOST_CLASSES: Final = 10_000
+"""Classes of a distribution at most."""
+
+SUM_TOLERANCE: Final = 0.01
+"""Volume fractions are normalised when their sum is within this of 1; further off is an error."""
 
 SAME_SIZE = 1e-9
 """Relative difference of sizes that is rounding (20 um and 0.02 mm)."""
@@ -251,6 +258,8 @@ def read_csd(path: Path) -> CrystalSizeDistribution:
     CsdError
         If the file cannot be read, may mean more than one distribution, or its classes are none.
     """
+    from filtercake.crystals.instruments import read_classes
+
     found = read_classes(path)
     try:
         csd = CrystalSizeDistribution.from_classes(found.size, found.volume_fraction)
@@ -264,29 +273,34 @@ def mixture(sizes: Sequence[float], volume_fractions: Sequence[float]) -> Crysta
     return CrystalSizeDistribution.from_classes(sizes, volume_fractions)
 
 
-def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> pd.DataFrame:
-    """Tabulate a distribution and its truncation; classes left out of the packing have truncated fractions 0.
+def columns(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> dict[str, FloatArray]:
+    """List a distribution and its truncation; classes left out of the packing have truncated fractions 0.
 
     Returns
     -------
-    DataFrame
+    dict of str to ndarray, shape (n,)
         Columns size_um, volume_fraction, number_fraction, x_over_d_1_m, x_over_d2_1_m2, truncated_volume_fraction,
-        truncated_number_fraction; one row per class of the full distribution.
+        truncated_number_fraction; one value per class of the full distribution.
     """
     inside = kept_classes(full, truncated)
     volume, number = np.zeros(full.size.size), np.zeros(full.size.size)
     volume[inside], number[inside] = truncated.volume_fraction, truncated.number_fraction
-    return pd.DataFrame(
-        {
-            "size_um": full.size / MICROMETRE,
-            "volume_fraction": full.volume_fraction,
-            "number_fraction": full.number_fraction,
-            "x_over_d_1_m": full.volume_fraction / full.size if full.x_over_d is None else full.x_over_d,
-            "x_over_d2_1_m2": full.volume_fraction / full.size**2 if full.x_over_d2 is None else full.x_over_d2,
-            "truncated_volume_fraction": volume,
-            "truncated_number_fraction": number,
-        }
-    )
+    return {
+        "size_um": full.size / MICROMETRE,
+        "volume_fraction": full.volume_fraction,
+        "number_fraction": full.number_fraction,
+        "x_over_d_1_m": full.volume_fraction / full.size if full.x_over_d is None else full.x_over_d,
+        "x_over_d2_1_m2": full.volume_fraction / full.size**2 if full.x_over_d2 is None else full.x_over_d2,
+        "truncated_volume_fraction": volume,
+        "truncated_number_fraction": number,
+    }
+
+
+def to_table(full: CrystalSizeDistribution, truncated: CrystalSizeDistribution) -> pd.DataFrame:
+    """Tabulate a distribution and its truncation: :func:`columns`, one row per class of the full distribution."""
+    import pandas as pd  # who asks for a resistance needs no table
+
+    return pd.DataFrame(columns(full, truncated))
 
 
 def from_table(table: pd.DataFrame) -> FullAndTruncated:
@@ -317,6 +331,8 @@ def read_tables(paths: Iterable[str | Path]) -> dict[str, FullAndTruncated]:
     CsdError
         As :func:`from_table`.
     """
+    import pandas as pd
+
     return {Path(path).stem: from_table(pd.read_csv(path)) for path in paths}
 
 

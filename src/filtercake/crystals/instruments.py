@@ -41,14 +41,9 @@ from filtercake.crystals.column_names import (
     per_size_unit,
     unit_of,
 )
+from filtercake.crystals.csd import MOST_CLASSES, SUM_TOLERANCE
 from filtercake.errors import CsdError, shown
 from filtercake.units import FRACTION_UNITS, LENGTH_UNITS, MICROMETRE, FloatArray
-
-MOST_CLASSES: Final = 10_000
-"""Classes of a distribution at most."""
-
-SUM_TOLERANCE: Final = 0.01
-"""Volume fractions are normalised when their sum is within this of 1; further off is an error."""
 
 MOST_UNSEEN: Final = 1e-3
 """Share below the smallest or above the largest size of a cumulative distribution that may be left out."""

@@ -12,12 +12,10 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from filtercake.crystals.crystallizer import BIN_WIDTH, UPPER_SCALES
-from filtercake.crystals.csd import CrystalSizeDistribution, discretise
-from filtercake.crystals.instruments import MOST_CLASSES
+from filtercake.crystals.csd import MOST_CLASSES, CrystalSizeDistribution, discretise
 from filtercake.errors import CrystallizerError, CsdError
 from filtercake.units import MICROMETRE, FloatArray
 
@@ -108,14 +106,16 @@ def cut_moments(
 
 def _end(share_below: Callable[[float], float], start: float) -> float:
     """Size with the volume above it that an MSMPR product has above its largest class."""
-    target = float(scipy.special.gammainc(4.0, UPPER_SCALES))
+    from scipy import optimize, special
+
+    target = float(special.gammainc(4.0, UPPER_SCALES))
 
     def beyond(log_size: float) -> float:
         return share_below(start * math.exp(log_size)) - target
 
     for reach in (4.0, 16.0, 64.0):
         if beyond(-reach) < 0.0 < beyond(reach):
-            return start * math.exp(float(scipy.optimize.brentq(beyond, -reach, reach, xtol=1e-12)))
+            return start * math.exp(float(optimize.brentq(beyond, -reach, reach, xtol=1e-12)))
     raise CrystallizerError(
         f"the product has no end near a size of {start / MICROMETRE:.4g} um; check the residence time, the kinetics "
         "and the sizes of fines and coarse crystals"

@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from filtercake.crystals.crystallizer import BIN_WIDTH, LARGEST_LOGARITHM, Kinetics, SteadyState, steady_state
@@ -207,6 +206,8 @@ def r_z_product(state: RzState, bin_width: float = BIN_WIDTH) -> CrystalSizeDist
 
 def _growth_over_mixed(kinetics: Kinetics, plain: SteadyState, withdrawal: Withdrawal) -> float:
     """Growth rate over that of the MSMPR crystallizer of the same residence time and slurry concentration."""
+    from scipy import optimize
+
     mixed = FACTORIALS[3] * plain.size_scale**4
 
     def surplus(log_ratio: float) -> float:
@@ -225,7 +226,7 @@ def _growth_over_mixed(kinetics: Kinetics, plain: SteadyState, withdrawal: Withd
                 f"kinetics {kinetics.name}: no growth rate in the range of numbers gives the slurry concentration; "
                 "check fines_size and classification_size, in m"
             )
-    return math.exp(float(scipy.optimize.brentq(surplus, 0.0, high, xtol=1e-14, rtol=1e-14)))
+    return math.exp(float(optimize.brentq(surplus, 0.0, high, xtol=1e-14, rtol=1e-14)))
 
 
 def _withdrawn(withdrawal: Withdrawal, size: FloatArray) -> FloatArray:

@@ -13,7 +13,6 @@ from statistics import NormalDist
 from typing import Any, Final
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from filtercake.crystals.csd import CrystalSizeDistribution, mixture
@@ -56,6 +55,8 @@ def lognormal(d10: float, d50: float, d90: float) -> CrystalSizeDistribution:
     CsdError
         If they do not ascend, or D50 is not within ``MEDIAN_TOLERANCE`` of sqrt(D10 D90).
     """
+    from scipy import special
+
     shown = ", ".join(f"{size / MICROMETRE:g}" for size in (d10, d50, d90))
     if not 0.0 < d10 < d50 < d90:
         raise CsdError(f"d10, d50, d90 = {shown} um: must ascend")
@@ -71,7 +72,7 @@ def lognormal(d10: float, d50: float, d90: float) -> CrystalSizeDistribution:
     def part(power: int) -> Cumulative:
         whole = math.exp(-power * math.log(d50) + 0.5 * (power * spread) ** 2)
         return lambda size: (
-            whole * np.asarray(scipy.special.ndtr(np.log(size / d50) / spread + power * spread), dtype=np.float64)
+            whole * np.asarray(special.ndtr(np.log(size / d50) / spread + power * spread), dtype=np.float64)
         )
 
     ends = [d50 * math.exp(spread * NormalDist().inv_cdf(share)) for share in (TAIL, 1.0 - TAIL)]
@@ -98,6 +99,8 @@ def rosin_rammler(size: float, exponent: float) -> CrystalSizeDistribution:
     CsdError
         If the sum of x/d^2 diverges.
     """
+    from scipy import special
+
     if not exponent > LEAST_EXPONENT:
         raise CsdError(
             f"exponent = {exponent:g}: must be above {LEAST_EXPONENT:g}: with fewer, the sum of x/d^2, and so the "
@@ -107,9 +110,7 @@ def rosin_rammler(size: float, exponent: float) -> CrystalSizeDistribution:
     def part(power: int) -> Cumulative:
         rest = 1.0 - power / exponent
         whole = math.gamma(rest) / size**power
-        return lambda sizes: (
-            whole * np.asarray(scipy.special.gammainc(rest, (sizes / size) ** exponent), dtype=np.float64)
-        )
+        return lambda sizes: whole * np.asarray(special.gammainc(rest, (sizes / size) ** exponent), dtype=np.float64)
 
     ends = [size * (-math.log1p(-share)) ** (1.0 / exponent) for share in (TAIL, 1.0 - TAIL)]
     words = f"Rosin-Rammler by volume: d' {size / MICROMETRE:.4g} um, exponent {exponent:g}"

@@ -22,7 +22,7 @@ from pydantic import Field, model_validator
 
 from filtercake.errors import CostError, did_you_mean
 from filtercake.study.config.values import TO_NUMBER, TO_TEXT, TO_WHOLE, Model, Name
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 from filtercake.units import HOUR, FloatArray
 from filtercake.user_files import read_yaml
 

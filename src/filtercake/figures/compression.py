@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from filtercake.figures import selection, style
 from filtercake.figures.selection import StudyData
 from filtercake.filtration.compressible import cake_average, cake_profile, shape
-from filtercake.packing.compression import LEAST_LOAD, CompressionCurve
+from filtercake.packing.compression import CompressionCurve
+from filtercake.packing.similarity import LEAST_LOAD
 from filtercake.statistics import half_width
 from filtercake.study.points import base_rows
 from filtercake.units import FloatArray

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy
 
 from filtercake.errors import FiltrationError
 from filtercake.filtration.constant_pressure import (
@@ -181,6 +180,8 @@ def quantile_of(fit: FiltrationFit) -> float:
 
 def _half_width(value: float, weight: FloatArray, fits: Sequence[FiltrationFit], name: str) -> float:
     """Larger half of the 95 % interval of a mixture of Student distributions about a value."""
+    from scipy import special
+
     centre = np.array([getattr(fit, name) for fit in fits])
     error = np.maximum([getattr(fit, f"{name}_se") for fit in fits], np.finfo(np.float64).tiny)
     freedom = np.array([fit.dof for fit in fits])
@@ -190,7 +191,7 @@ def _half_width(value: float, weight: FloatArray, fits: Sequence[FiltrationFit],
         lower, upper = low, high
         for _ in range(_HALVINGS):
             middle = 0.5 * (lower + upper)
-            below = float(weight @ scipy.special.stdtr(freedom, (middle - centre) / error)) < probability
+            below = float(weight @ special.stdtr(freedom, (middle - centre) / error)) < probability
             lower, upper = (middle, upper) if below else (lower, middle)
         return 0.5 * (lower + upper)
 

@@ -28,10 +28,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from filtercake.errors import FilterError
@@ -48,6 +47,9 @@ from filtercake.filtration.ranges import (
     require,
 )
 from filtercake.units import LENGTH_UNITS, MICROMETRE, FloatArray, duration
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 WATER_DENSITY: Final = 1000.0
 """Density the paper assumes for the filtrate, kg/m3."""
@@ -432,6 +434,8 @@ def design_table(
     FilterError
         As :func:`area` and :func:`cake_thickness`; or if the flows are neither one nor n.
     """
+    import pandas as pd  # who sizes one filter needs no table
+
     flows = require("slurry_flow", slurry_flow, "m3/s", POSITIVE)
     if flows.shape not in ((), (len(cakes),)):
         raise FilterError(f"slurry_flow has shape {flows.shape}: must be one number or one per cake ({len(cakes)})")

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import scipy
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import did_you_mean
@@ -270,14 +269,16 @@ def implied_porosity(
     ValueError
         If an argument is out of range, the law is unknown, or ``stokes`` has no constant.
     """
+    from scipy import optimize, special
+
     if not (resistance > 0.0 and math.isfinite(resistance)):
         raise ValueError(f"resistance {resistance:g} m/kg is not positive")
     at_half = law_of(law).evaluate(0.5, csd, density, sphericity, kozeny_constant)
     # (1 - eps)/eps^3 falls from infinity to 0: one root, found in ln(eps/(1 - eps)), where its slope is -3 to -1
     ratio = math.log(resistance) - math.log(at_half)
     farthest = abs(ratio) + 1.0
-    root = float(scipy.optimize.brentq(lambda odds: _log_solids_over_cube(odds) - ratio, -farthest, farthest))
-    return float(scipy.special.expit(root))
+    root = float(optimize.brentq(lambda odds: _log_solids_over_cube(odds) - ratio, -farthest, farthest))
+    return float(special.expit(root))
 
 
 def _log_solids_over_cube(odds: float) -> float:

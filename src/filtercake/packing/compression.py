@@ -16,7 +16,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from filtercake import __version__
 from filtercake.errors import PackingRejected
 from filtercake.packing import contact_law
 from filtercake.packing.cell import CellScene, PressedCell, press_through
@@ -24,13 +23,11 @@ from filtercake.packing.contacts import find_contacts, relative_overlap
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene
-from filtercake.packing.similarity import SIMULATED_MODULUS
+from filtercake.packing.similarity import LEAST_LOAD, SIMULATED_MODULUS
 from filtercake.units import FloatArray
 
-LOADS: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 256.0, 1024.0, 4096.0, math.inf)
+LOADS: Final = (LEAST_LOAD, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 256.0, 1024.0, 4096.0, math.inf)
 """Loads x = p/p_c to which a cell is led; the last without attraction."""
-LEAST_LOAD: Final = LOADS[0]
-"""Load under which a packing depends on how it was made."""
 STRESS_OVER_MODULUS: Final = 3.4e-5
 """Highest simulated stress over E*: that of 53 kPa on crystals of 3 GPa. Six times as much packs denser by 0.004."""
 PATIENCE: Final = 400_000
@@ -161,6 +158,8 @@ def _attraction(scene: Scene, cell: CellScene, strength: float) -> dict[str, Any
 
 def _measurements(found: Sequence[PressedCell], loads: Sequence[float]) -> dict[str, Any]:
     """Plain numbers that describe an accepted cell."""
+    from filtercake import __version__
+
     last = found[-1]
     contacts = find_contacts(last.position, last.radius, last.length)
     return {

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from filtercake.packing.cloud import size_levels
 from filtercake.units import FloatArray, IntArray
@@ -36,6 +35,8 @@ def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Co
     Spheres are searched by size level, so that a wide distribution costs no more than its contacts. Positions (n, 3),
     radii (n,) and the side of the box in m.
     """
+    from scipy import spatial
+
     wrapped = position.copy()
     wrapped[:, :2] %= length
     wrapped[:, :2][wrapped[:, :2] >= length] = 0.0
@@ -43,7 +44,7 @@ def find_contacts(position: FloatArray, radius: FloatArray, length: float) -> Co
     box = np.array([length, length, 0.0])
     level = size_levels(radius)
     members = [np.flatnonzero(level == k) for k in np.unique(level)]
-    trees = [scipy.spatial.cKDTree(wrapped[m], boxsize=box) for m in members]
+    trees = [spatial.cKDTree(wrapped[m], boxsize=box) for m in members]
     first, second, depth = [], [], []
     for a, coarse in enumerate(members):
         for b in range(a, len(members)):

@@ -21,6 +21,8 @@ LARGEST_LOAD: Final = 3e-4
 """Stress over E* up to which spheres count as rigid."""
 LARGEST_STRENGTH: Final = 1e-5
 """Stress that adhesion holds over E* up to which spheres count as rigid."""
+LEAST_LOAD: Final = 1.0
+"""Load x = p/p_c under which a packing depends on how it was made."""
 ROUNDING: Final = 1e-9
 """Share by which a limit may be exceeded: a strength that was computed by way of a cohesion."""
 

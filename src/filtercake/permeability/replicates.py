@@ -15,7 +15,6 @@ from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.result import Packing, publish, read_record, read_sealed, sealed, sha256, write_json
 from filtercake.packing.scene import digest
-from filtercake.permeability.measure import Domain, bed_domain, cell_domain, solve
 from filtercake.permeability.result import Permeability, Picture
 
 RECORD: Final = "permeability.json"
@@ -59,10 +58,10 @@ def solve_replicates(
         picture = folder / PICTURE if not rows else None
         row = _kept(folder / f"r{outcome.replicate}.json", key, picture)
         if row is None:
-            found, cut = solve(
-                _domain(packing, accuracy),
+            found, cut = _solve(
+                packing,
                 accuracy,
-                say=lambda line, who=outcome.replicate: note(f"r{who} {line}"),  # type: ignore[misc]
+                lambda line, who=outcome.replicate: note(f"r{who} {line}"),  # type: ignore[misc]
                 picture=picture is not None,
             )
             row = {"key": key, "replicate": outcome.replicate, **row_of(found)}
@@ -74,11 +73,17 @@ def solve_replicates(
     write_json(folder / RECORD, sealed({"packings": rows}))
 
 
-def _domain(packing: Packing, accuracy: float) -> Domain:
-    """Take a settled bed between its floor and surface, a pressed cell whole."""
+def _solve(packing: Packing, accuracy: float, say: Report, *, picture: bool) -> tuple[Permeability, Picture | None]:
+    """Solve the flow in a settled bed between its floor and surface, in a pressed cell whole."""
+    # who reads what was solved need not wait for the compiler
+    from filtercake.permeability.measure import bed_domain, cell_domain, solve
+
+    position, radius, length = packing.position, packing.radius, packing.length
     if packing.is_cell:
-        return cell_domain(packing.position, packing.radius, np.full(3, packing.length), accuracy)
-    return bed_domain(packing.position, packing.radius, packing.length, accuracy)
+        domain = cell_domain(position, radius, np.full(3, length), accuracy)
+    else:
+        domain = bed_domain(position, radius, length, accuracy)
+    return solve(domain, accuracy, say=say, picture=picture)
 
 
 def row_of(found: Permeability) -> dict[str, Any]:

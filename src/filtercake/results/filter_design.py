@@ -11,9 +11,9 @@ from filtercake.errors import FilterError
 from filtercake.filtration.drum_filter import Cake, DrumFilter, area, design_table
 from filtercake.results.paper_tables import Csds, published_number
 from filtercake.results.resistance_columns import ALWAYS, LAW, LAW_CI95
-from filtercake.study.config.filter import Filter
+from filtercake.study.config.filter import drum_filter
 from filtercake.study.config.study import Study
-from filtercake.units import HOUR, KILOPASCAL, MILLIPASCAL_SECOND, MINUTE, FloatArray
+from filtercake.units import HOUR, KILOPASCAL, MINUTE, FloatArray
 
 
 def filter_design(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
@@ -92,15 +92,3 @@ def drum_of(study: Study) -> DrumFilter:
     if study.filter is None or study.crystallizer is None:
         raise FilterError("the study has no filter: add the sections crystallizer and filter")
     return drum_filter(study.filter, study.crystallizer.slurry_concentration_kg_m3)
-
-
-def drum_filter(settings: Filter, slurry_concentration: float) -> DrumFilter:
-    """Return a drum filter for a slurry with so many kg of crystals per m3, in SI."""
-    return DrumFilter(
-        pressure_drop=settings.pressure_drop_kPa * KILOPASCAL,
-        submerged_fraction=settings.submerged_fraction,
-        rotation_rate=settings.rotation_rate_rpm / MINUTE,
-        medium_resistance=settings.medium_resistance_1_m,
-        viscosity=settings.viscosity_mPa_s * MILLIPASCAL_SECOND,
-        slurry_concentration=slurry_concentration,
-    )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-import pandas as pd
+if TYPE_CHECKING:
+    import pandas as pd
 
 NAMES: Final = ("point", "study", "csd", "label", "kinetics")
 """Columns of what users named: 01, NA, null, 1e5 and nan among them."""
@@ -22,6 +23,8 @@ def read_table(path: str | Path) -> pd.DataFrame:
     OSError, ValueError
         If it cannot be read.
     """
+    import pandas as pd  # who plans a study reads no table
+
     columns = pd.read_csv(path, nrows=0).columns
     return pd.read_csv(
         path,

@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from filtercake import __version__
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.liggghts import template_folder
 from filtercake.packing.result import sha256
@@ -72,10 +71,18 @@ def _closure(start: Path, closed: Path | None = None) -> set[Path]:
         if path in found:
             continue
         found.add(path)
-        waiting += [parent / "__init__.py" for parent in path.parents if ROOT in (parent, *parent.parents)]
+        waiting += _packages(path.parent)
         if path != closed:
             waiting += _imports(path)
     return found
+
+
+@cache
+def _packages(folder: Path) -> tuple[Path, ...]:
+    """Files of the packages that a folder is and lies in, up to ``ROOT``; none outside of it."""
+    if folder == ROOT:
+        return (folder / "__init__.py",)
+    return (*_packages(folder.parent), folder / "__init__.py") if ROOT in folder.parents else ()
 
 
 def packing_code(engine: str) -> str:
@@ -121,6 +128,8 @@ def _meaning(source: str) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of filtercake, Python and the packages it stands on."""
+    from filtercake import __version__
+
     found = {"filtercake": __version__, "python": platform.python_version()}
     for package in PACKAGES:
         try:

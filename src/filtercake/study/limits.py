@@ -16,11 +16,10 @@ import numpy as np
 
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing import contact_law
-from filtercake.packing.compression import LEAST_LOAD
 from filtercake.packing.engines import kind_of
 from filtercake.packing.representation import Representation, particles_for, represent
 from filtercake.packing.scene import Scene
-from filtercake.packing.similarity import LARGEST_LOAD, LARGEST_STRENGTH
+from filtercake.packing.similarity import LARGEST_LOAD, LARGEST_STRENGTH, LEAST_LOAD
 from filtercake.packing.slab import LEAST_BED_DIAMETERS
 from filtercake.units import GIGAPASCAL, KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, MICROMETRE, MICROSECOND
 

@@ -7,14 +7,12 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
-
-from pydantic import BaseModel, ValidationError
+from typing import Any
 
 from filtercake.crystals.crystallizer import Kinetics, SteadyState, crystal_size_distribution, steady_state
 from filtercake.crystals.csd import CrystalSizeDistribution, read_csd, truncate
 from filtercake.crystals.size_laws import made
-from filtercake.errors import LONGEST_SHOWN, ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
+from filtercake.errors import ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
 from filtercake.filtration.resistance import RESISTANCE_LAWS, law_of
 from filtercake.packing.cloud import bed_for, cell_for
 from filtercake.packing.engines.embedded import Embedded
@@ -25,23 +23,11 @@ from filtercake.study.config.packing import AUTO, Packing
 from filtercake.study.config.study import MOST_DISTRIBUTIONS, Study, Workflow
 from filtercake.study.config.sweep import OF_FILTRATION, SWEPT
 from filtercake.study.config.values import MOST_PARTICLES, MOST_POINTS, NAME
+from filtercake.study.parsing import parse
 from filtercake.study.products import resolve, slurry_problems
 from filtercake.study.scenes import scene_of
 from filtercake.units import MICROMETRE, MINUTE
 from filtercake.user_files import is_file, read_yaml
-
-MOST_PROBLEMS = 1000
-RENAMED = {
-    "slurry_density_kg_m3": ("slurry_concentration_kg_m3", "solids_per_filtrate_kg_m3"),
-    "slurry_concentration_kg_m3": ("solids_per_filtrate_kg_m3",),
-    "slurry_density_exponent": ("slurry_concentration_exponent",),
-    "porosity_interval": ("porosity_ci95_target",),
-    "target_interval": ("relative_ci95_target",),
-    "column_ratio": ("bed_depth_factor",),
-    "void_fraction": ("initial_void_fraction",),
-}
-"""Keys of earlier versions, and what they are called now."""
-"""Problems of a file that are looked into."""
 
 OWN_NAMES = ("benchmark", "benchmark_quick", "benchmark_redrawn", "benchmarks", "logs", "pages")
 """Folders of the results that are the workflow's own: no study can have such a name."""
@@ -53,8 +39,6 @@ _OWN = ", ".join([*OWN_NAMES, *(f"{prefix}..." for prefix in OWN_PREFIXES), "a f
 
 NAMED_KEYS = ("studies", "calibrations", "results")
 """Keys of the workflow's configuration that hold names."""
-
-M = TypeVar("M", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -254,70 +238,6 @@ def load_studies(paths: Iterable[Path]) -> list[LoadedStudy]:
     if problems:
         raise ConfigError(problems)
     return studies
-
-
-def parse(model: type[M], values: Any, file: str) -> M:
-    """Check what :func:`~filtercake.user_files.read_yaml` returned for a file against the model of that file.
-
-    Raises
-    ------
-    ConfigError
-        With every problem.
-    """
-    if not isinstance(values, dict):
-        raise ConfigError([Problem(file, "(file)", shown(values), "must be a mapping of keys to values")])
-    try:
-        return model.model_validate(values)
-    except ValidationError as error:
-        found = error.errors(include_url=False)
-        raise ConfigError([_problem(model, item, file) for item in found[:MOST_PROBLEMS]]) from None
-
-
-def _problem(model: type[BaseModel], item: Any, file: str) -> Problem:
-    location = [part for part in item["loc"] if part != "[key]"]
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{_plain(part)}" for part in location)
-    key = key.lstrip(".") or "(file)"
-    value, message = shown(item["input"]), item["msg"].removeprefix("Value error, ")
-    if item["type"] == "extra_forbidden":
-        allowed = _allowed_keys(model, location[:-1])
-        new = next((name for name in RENAMED.get(str(location[-1]), ()) if name in allowed), None)
-        message = f"unknown key; allowed here: {', '.join(allowed)}{did_you_mean(str(location[-1]), allowed)}"
-        if new is not None:
-            message = f"is now called {new}"
-    elif item["type"] == "missing":
-        value, message = "(missing)", "must be given"
-    elif item["type"] == "literal_error":
-        message = f"allowed: {item['ctx']['expected']}"
-    elif item["type"] == "too_short":
-        least = item["ctx"]["min_length"]
-        message = "must hold at least one value" if least == 1 else f"must hold at least {least} values"
-    elif " should " in message:
-        message = "must " + message.partition(" should ")[2]
-    return Problem(file, key, value, message)
-
-
-def _plain(word: str) -> str:
-    """Write a key as it is, or as a short literal where it would spoil the message."""
-    return word if word.isprintable() and len(word) <= LONGEST_SHOWN else shown(word)
-
-
-def _allowed_keys(model: type[BaseModel], location: list[Any]) -> list[str]:
-    """Keys of the part of the model that a location leads to."""
-    named_by_user = False
-    for part in location:
-        if isinstance(part, int) or named_by_user:
-            named_by_user = False
-        elif part in model.model_fields:
-            annotation = model.model_fields[part].annotation
-            named_by_user = get_origin(annotation) is dict
-            model = _inner_model(annotation) or model
-    return list(model.model_fields)
-
-
-def _inner_model(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((found for arg in get_args(annotation) if (found := _inner_model(arg))), None)
 
 
 def _source_of(name: str, csd: Csd) -> tuple[str, str]:

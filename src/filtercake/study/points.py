@@ -6,10 +6,9 @@ import itertools
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene, digest
 from filtercake.study.config.packing import AUTO
@@ -18,6 +17,9 @@ from filtercake.study.config.sweep import OF_FILTRATION, SWEPT, Sweep
 from filtercake.study.loading import LoadedStudy
 from filtercake.study.scenes import scene_of
 from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, MILLIJOULE_PER_M2, tidy
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ChooseEngine = Callable[[Scene], str]
 """Names an engine for a scene."""
@@ -160,6 +162,8 @@ def base_point(
 
 def points_table(points: Iterable[Point]) -> pd.DataFrame:
     """Tabulate points: ``POINT_COLUMNS`` and the replicates asked for."""
+    import pandas as pd  # who plans a study needs no table
+
     rows = [{**point.row(), "replicates": point.replicates} for point in points]
     return pd.DataFrame(rows, columns=[*POINT_COLUMNS, "replicates"])
 

@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from filtercake.api.pack import pack
+from filtercake.api.packings import pack
 from filtercake.api.steps import distribution
 from filtercake.packing.result import Packing, publish
 from filtercake.permeability.lattice import Spheres, build

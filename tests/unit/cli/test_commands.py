@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filtercake import api
-from filtercake.api.steps import load_packing
+from filtercake.api.measured import load_packing
 from filtercake.cli import commands as cli
 from filtercake.cli.commands import build_parser, main
 from filtercake.errors import ConfigError, PackingRejected
@@ -579,7 +579,7 @@ def no_settling(packed: Path, tmp_path_factory: pytest.TempPathFactory) -> Itera
         return [Outcome(k, "ok", "", 1, "", 1) for k in (0, 1)]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(importlib.import_module("filtercake.api.pack"), "_make", take)
+        patch.setattr(importlib.import_module("filtercake.api.packings"), "_make", take)
         patch.chdir(shelf)
         yield shelf
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from filtercake import __version__
 from filtercake.errors import EngineError, TimeLimitReached
 from filtercake.packing.engines.base import Engine, SettleRequest, parallelism
 from filtercake.packing.pictures import write_vtk
@@ -46,6 +45,7 @@ class Embedded(Engine):
     def settle(self, request: SettleRequest) -> SettledState:
         """Let the cloud settle (see :class:`filtercake.packing.engines.base.Engine`)."""
         # who plans a study need not wait for the compiler
+        from filtercake import __version__
         from filtercake.packing.engines.embedded_bed import Bed, use_threads
 
         threads = parallelism(request.scene)

@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
 from filtercake.errors import EngineError, EngineMissing
@@ -192,6 +191,8 @@ def render(template: str, values: dict[str, Any]) -> str:
     EngineError
         If the template is missing or asks for a value that is not given.
     """
+    import jinja2
+
     folder = template_folder()
     try:
         return templates(folder).get_template(template).render(values)

@@ -6,7 +6,9 @@ from typing import Annotated
 
 from pydantic import Field
 
+from filtercake.filtration.drum_filter import DrumFilter
 from filtercake.study.config.values import TO_NUMBER, Density, Model
+from filtercake.units import KILOPASCAL, MILLIPASCAL_SECOND, MINUTE
 
 
 class Filter(Model):
@@ -28,3 +30,15 @@ class Filter(Model):
         default=1.0, description="Viscosity of the filtrate, mPa s."
     )
     liquid_density_kg_m3: Density = Field(default=1000.0, description="Density of the filtrate, kg/m3.")
+
+
+def drum_filter(settings: Filter, slurry_concentration: float) -> DrumFilter:
+    """Return a drum filter for a slurry with so many kg of crystals per m3, in SI."""
+    return DrumFilter(
+        pressure_drop=settings.pressure_drop_kPa * KILOPASCAL,
+        submerged_fraction=settings.submerged_fraction,
+        rotation_rate=settings.rotation_rate_rpm / MINUTE,
+        medium_resistance=settings.medium_resistance_1_m,
+        viscosity=settings.viscosity_mPa_s * MILLIPASCAL_SECOND,
+        slurry_concentration=slurry_concentration,
+    )

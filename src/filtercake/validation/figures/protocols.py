@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
-from filtercake.api.pack import pack
+from filtercake.api.packings import pack
 from filtercake.api.steps import distribution
 from filtercake.figures import style
 from filtercake.figures.cross_section import draw_levels, draw_spheres

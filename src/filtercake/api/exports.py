@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from filtercake.api.steps import PackingPorosity, porosity
+from filtercake.api.measured import PackingPorosity, porosity
 from filtercake.crystals.csd import FullAndTruncated, from_table, to_table
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
 from filtercake.packing.cloud import make_cloud

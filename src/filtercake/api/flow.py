@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,19 +10,20 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from filtercake.api.steps import ORIGIN, PLAIN_DENSITY, load_packing
+from filtercake.api.arguments import ORIGIN
+from filtercake.api.measured import load_packing
+from filtercake.api.steps import PLAIN_DENSITY
 from filtercake.crystals.csd import mixture
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
 from filtercake.filtration.resistance import KozenyConstant
 from filtercake.packing.own_spheres import OwnSpheres, check_spheres, read_spheres
 from filtercake.packing.result import SEAL, Packing, read_record
-from filtercake.permeability.measure import Report, measure_bed, measure_cell
 from filtercake.permeability.replicates import constant_of
 from filtercake.permeability.resolution import ACCURACY, COARSEST_ACCURACY, FINEST_ACCURACY
 from filtercake.permeability.result import Level, Permeability
 from filtercake.study.config.values import TO_NUMBER, TO_WHOLE, Density, Model
 from filtercake.study.limits import unit_problems
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 from filtercake.units import MICROMETRE
 
 MOST_THREADS = 256
@@ -123,6 +124,7 @@ class PermeabilityOptions(Model):
     trust_units: bool = Field(default=False, description="Take density and sizes as they are, however unlikely.")
 
 
+Report = Callable[[str], None]
 Source = str | Path | Packing | Mapping[str, Any]
 """What a packing is given as."""
 
@@ -239,6 +241,8 @@ def _check_units(spheres: OwnSpheres) -> None:
 
 
 def _solve(spheres: OwnSpheres, given: PermeabilityOptions, say: Report) -> Permeability:
+    from filtercake.permeability.measure import measure_bed, measure_cell
+
     position, radius, box = spheres.position, spheres.radius, spheres.box
     how: dict[str, Any] = {
         "accuracy": given.accuracy,

@@ -10,13 +10,13 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from filtercake.api.steps import ORIGIN
+from filtercake.api.arguments import ORIGIN
 from filtercake.crystals.cascade import MOST_STAGES, cascade, cascade_product
 from filtercake.crystals.crystallizer import Kinetics, get_kinetics, load_kinetics
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.crystals.r_z import Withdrawal, r_z_product, r_z_steady_state
 from filtercake.study.config.values import TO_NUMBER, Model, Name, PathText
-from filtercake.study.loading import parse
+from filtercake.study.parsing import parse
 from filtercake.units import MICROMETRE, MINUTE
 
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import pandas as pd
 
-from filtercake.api.steps import ORIGIN, Distribution, csd_name, load, resistance
+from filtercake.api.arguments import ORIGIN
+from filtercake.api.steps import Distribution, csd_name, load, resistance
 from filtercake.errors import ConfigError, PackingRejected, Problem
 from filtercake.filtration.resistance import CARMAN
 from filtercake.packing.pack import MANIFEST, Outcome, Report, pack_replicates, point_key
