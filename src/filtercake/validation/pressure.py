@@ -252,6 +252,7 @@ def _invariance(friction: float) -> list[Case]:
         ("spheres 2000 -> 1000", replace(base, radius=cell(pmma(), 1000).radius)),
         ("spheres 2000 -> 8000", replace(base, radius=cell(pmma(), 8000).radius)),
         ("time step halved", replace(base, time_step_rayleigh=0.5 * step)),
+        ("pressed along one axis", replace(base, uniaxial=True)),
     ]
     return [
         Case(INVARIANCE, f"mu{friction:g}_{k}", label, (scene,), _members(MEMBERS[friction], scene.radius.size))
@@ -424,7 +425,7 @@ def _asked(scene: CellScene) -> dict[str, Any]:
 
 
 def _row(scene: CellScene, found: PressedCell, seconds: float) -> dict[str, Any]:
-    contacts = _contacts(found.position, found.radius, found.length)
+    contacts = _contacts(found.position, found.radius, found.sides)
     fewest = FEWEST_CONTACTS[scene.friction > 0.0]
     coordination, rattlers = backbone(contacts, found.radius.size, fewest)
     return {
@@ -446,11 +447,11 @@ def _warm(frictional: bool, cohesive: bool) -> None:
     press(few)
 
 
-def _contacts(position: FloatArray, radius: FloatArray, length: float) -> IntArray:
+def _contacts(position: FloatArray, radius: FloatArray, sides: FloatArray) -> IntArray:
     """Pairs of spheres that overlap in a box periodic in all directions, shape (m, 2); searched by size level."""
     level = size_levels(radius)
     groups = [np.flatnonzero(level == k) for k in np.unique(level)]
-    trees = [scipy.spatial.cKDTree(position[group] % length, boxsize=np.full(3, length)) for group in groups]
+    trees = [scipy.spatial.cKDTree(position[group] % sides, boxsize=sides) for group in groups]
     found = []
     for a, coarse in enumerate(groups):
         for b in range(a, len(groups)):

@@ -75,7 +75,7 @@ def test_each_change_of_the_cell_changes_one_thing(listed: list[Case]) -> None:
             for stage in case.stages
             if stage.friction == friction
         )
-        assert [sum(usual[key] != other[key] for key in usual) for other in others] == [1] * 11
+        assert [sum(usual[key] != other[key] for key in usual) for other in others] == [1] * 12
 
 
 def test_half_the_time_step_is_half(listed: list[Case]) -> None:
@@ -125,13 +125,18 @@ def test_a_cell_that_cannot_be_made_is_a_row_with_its_reason() -> None:
 
 def test_the_contacts_of_a_lattice_are_counted_across_the_sides() -> None:
     place = np.stack(np.meshgrid(*[np.arange(3.0)] * 3), axis=-1).reshape(-1, 3)
-    pairs = pressure._contacts(place, np.full(27, 0.501), 3.0)
+    sides = np.full(3, 3.0)
+    pairs = pressure._contacts(place, np.full(27, 0.501), sides)
     assert pressure.backbone(pairs, 27, 4) == (6.0, 0.0)
     # a small sphere in the middle of each cube touches eight
     both = np.concatenate([place, place + 0.5])
     radius = np.concatenate([np.full(27, 0.501), np.full(27, 0.366)])
-    coordination, rattlers = pressure.backbone(pressure._contacts(both, radius, 3.0), 54, 4)
+    coordination, rattlers = pressure.backbone(pressure._contacts(both, radius, sides), 54, 4)
     assert (coordination, rattlers) == (11.0, 0.0)
+    # twice as high: three layers more
+    high = np.concatenate([place, place + np.array([0.0, 0.0, 3.0])])
+    pairs = pressure._contacts(high, np.full(54, 0.501), np.array([3.0, 3.0, 6.0]))
+    assert pressure.backbone(pairs, 54, 4) == (6.0, 0.0)
 
 
 def test_rattlers_are_taken_away_until_none_is_left() -> None:
