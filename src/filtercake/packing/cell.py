@@ -28,6 +28,7 @@ from filtercake.errors import CellError, TimeLimitReached
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import class_radii, place_spheres
 from filtercake.packing.result import publish
+from filtercake.packing.scene import CELL_VOID_FRACTION
 from filtercake.packing.settling import TYPICAL_SOLIDS
 from filtercake.packing.similarity import LARGEST_LOAD, check_rigid
 from filtercake.units import FloatArray
@@ -115,7 +116,7 @@ class CellScene:
     youngs_modulus: float = 5e6
     poisson_ratio: float = 0.2
     seed: int = 1
-    void_fraction: float = 0.65
+    void_fraction: float = CELL_VOID_FRACTION
     drag: float = 2.0
     servo: float = 1e-2
     time_step_rayleigh: float = 0.0

@@ -43,7 +43,7 @@ SAME: Final = {0.0: 0.003, 0.05: 0.003, 0.3: 0.005}
 UNMOVED: Final = {0.0: 0.002, 0.05: 0.002, 0.3: 0.005}
 """Changes of porosity up to which a cell does not depend on how it was made, by friction."""
 SHARP: Final = 0.0007
-"""Standard error that each mean of the table of invariance should have."""
+"""Standard error that each mean of the tables of collapse and invariance should have."""
 NARROW: Final = 0.0012
 """Largest standard deviation of one packing of 2000, without friction."""
 HALF_WIDTH: Final = 0.002
@@ -169,6 +169,20 @@ def friction_series(means: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(solids=1.0 - rows["porosity"])
 
 
+def led(cells: pd.DataFrame) -> pd.DataFrame:
+    """Average the ways to a load, with 95 % half-widths from the spread of one packing, pooled by friction.
+
+    Returns
+    -------
+    DataFrame
+        The averages, and ``ci95``.
+    """
+    rows, spreads = averages(cells[cells["section"] == PATHS]), cell_spreads(cells)
+    one = [spreads[friction] for friction in rows["friction"]]
+    half = [quantile(each.freedom) * each.sd / math.sqrt(max(n, 1)) for each, n in zip(one, rows["n"], strict=True)]
+    return rows.assign(ci95=half)
+
+
 @dataclass(frozen=True)
 class Ensemble:
     """Mean of accepted packings.
@@ -214,7 +228,14 @@ def cell_spreads(cells: pd.DataFrame) -> dict[float, Spread]:
 
 
 def collapse(cells: pd.DataFrame) -> pd.DataFrame:
-    """Hold cohesions against each other at the same x: porosity of both, difference, its 95 % half-width, ``holds``."""
+    """Hold cohesions against each other at the same x.
+
+    Returns
+    -------
+    DataFrame
+        By friction and load: porosity of both, the larger standard error of the two, difference, its 95 % half-width,
+        ``holds``.
+    """
     rows, spreads = [], cell_spreads(cells)
     here = cells[cells["section"] == COLLAPSE]
     for friction, load in itertools.product(FRICTIONS, COLLAPSED):
@@ -229,6 +250,7 @@ def collapse(cells: pd.DataFrame) -> pd.DataFrame:
                 "rejected": weak.rejected + strong.rejected,
                 "weak": weak.porosity,
                 "strong": strong.porosity,
+                "se": max(_error(weak, spreads[friction]), _error(strong, spreads[friction])),
                 **found,
                 "limit": limit,
                 "holds": abs(found["change"]) <= limit,
@@ -293,7 +315,7 @@ def changes(cells: pd.DataFrame, section: str) -> pd.DataFrame:
                 "rejected": mine.rejected,
                 "porosity": mine.porosity,
             }
-            row |= {"se": one.sd / math.sqrt(mine.weight) if mine.n else math.nan, **found, "limit": limit}
+            row |= {"se": _error(mine, one), **found, "limit": limit}
             rows.append(row | {"holds": abs(found["change"]) <= limit})
     return pd.DataFrame(rows)
 
@@ -353,11 +375,16 @@ def mass_scaling(cells: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def _error(mean: Ensemble, one: Spread) -> float:
+    """Work out the standard error of a mean from the spread of one packing of 2000."""
+    return one.sd / math.sqrt(mean.weight) if mean.n else math.nan
+
+
 def _change(usual: Ensemble, other: Ensemble, one: Spread) -> dict[str, float]:
     """Difference of two means and the half-width of its 95 % interval, from the spread of one packing of 2000."""
     if not (usual.n and other.n):
         return {"change": math.nan, "ci95": math.nan}
-    error = one.sd * math.sqrt(1.0 / usual.weight + 1.0 / other.weight)
+    error = math.hypot(_error(usual, one), _error(other, one))
     return {"change": other.porosity - usual.porosity, "ci95": quantile(one.freedom) * error}
 
 
@@ -416,8 +443,9 @@ def _said_of_friction(means: pd.DataFrame) -> _Said:
 
 
 def _said_of_loads(cells: pd.DataFrame) -> _Said:
-    said = []
-    for row in _rows(collapse(cells)):
+    same = collapse(cells)
+    said = _said_of_errors(same, "two cohesions")
+    for row in _rows(same):
         where = f"x = {row['load']:g}, friction {row['friction']:g}"
         said.append((row["holds"], _too_far(f"30 and 50 kJ/m3, {where}", row["change"], row["ci95"], row["limit"])))
     for row in _rows(paths(cells)):
@@ -431,7 +459,7 @@ def _said_of_loads(cells: pd.DataFrame) -> _Said:
 
 
 def _said_of_changes(table: pd.DataFrame) -> _Said:
-    said = [
+    return _said_of_errors(table, "ways to make a cell") + [
         (
             row["holds"],
             _too_far(f"{row['label']}, friction {row['friction']:g}", row["change"], row["ci95"], row["limit"]),
@@ -439,10 +467,14 @@ def _said_of_changes(table: pd.DataFrame) -> _Said:
         for row in _rows(table)
         if math.isfinite(row["ci95"])
     ]
+
+
+def _said_of_errors(table: pd.DataFrame, what: str) -> _Said:
+    said = []
     for friction, group in table.groupby("friction"):
         worst = float(group["se"].max())
-        text = f"standard errors at friction {friction:g}: up to {worst:.4f}, at most {SHARP} wanted, for want of cells"
-        said.append((worst <= SHARP, text))
+        text = f"standard errors of {what} at friction {friction:g}: up to {worst:.4f}, at most {SHARP} wanted"
+        said.append((worst <= SHARP, f"{text}, for want of cells"))
     return said
 
 

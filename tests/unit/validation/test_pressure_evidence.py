@@ -18,7 +18,7 @@ from filtercake.packing.cell import CellScene
 from filtercake.packing.scene import Scene
 from filtercake.validation import pressure
 from filtercake.validation import pressure_evidence as evidence
-from filtercake.validation.pressure import COLUMNS, COST, INVARIANCE, PATHS, SCALING, Case, cases, kept_as
+from filtercake.validation.pressure import COLLAPSE, COLUMNS, COST, INVARIANCE, PATHS, SCALING, Case, cases, kept_as
 from filtercake.validation.pressure_page import CELLS, FRICTION_IMAGE, LOAD_IMAGE, MEANS, PAGE, render, write
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -169,6 +169,28 @@ def test_changes_are_against_the_first_of_each_friction() -> None:
     assert found["ci95"][1] == pytest.approx(2.776445 * 0.001 * math.sqrt(2.0 / 3.0), rel=1e-5)
     assert found["se"][1] == pytest.approx(0.001 / math.sqrt(3.0))
     assert math.isnan(found["ci95"][0])
+
+
+def test_each_mean_of_a_collapse_has_its_error() -> None:
+    rows = []
+    for friction, load in itertools.product(pressure.FRICTIONS, pressure.COLLAPSED):
+        for cohesion, porosity in ((30.0, [0.310, 0.312, 0.311]), (50.0, [0.312, 0.314])):
+            given = {"friction": friction, "load": load, "cohesion_kJ_m3": cohesion, "stress_Pa": load * cohesion}
+            rows += rows_of(f"s{cohesion}_x{load}_{friction}", porosity, COLLAPSE, **given)
+    (first, *_) = evidence.collapse(pd.DataFrame(rows)).to_dict("records")
+    assert first["change"] == pytest.approx(0.002)
+    # of two: 2 + 1 degrees of freedom at each of two loads, squares 2e-6 and 2e-6
+    sd = math.sqrt((2e-6 + 2e-6) * 2.0 / 6.0)
+    assert first["se"] == pytest.approx(sd / math.sqrt(2.0))
+    assert first["ci95"] == pytest.approx(2.446912 * sd * math.sqrt(1.0 / 3.0 + 1.0 / 2.0), rel=1e-5)
+
+
+def test_ways_to_a_load_have_intervals_even_where_there_is_one_cell_of_each() -> None:
+    rows = rows_of("stress_0", [0.310, 0.312], PATHS, load=3.0) + rows_of("direct_0", [0.315], PATHS, load=10.0)
+    found = evidence.led(pd.DataFrame(rows + rows_of("a", [0.32, 0.33])))
+    assert found["case"].tolist() == ["stress_0", "direct_0"]
+    sd = math.sqrt((2e-6 + 5e-5) / 2.0)
+    assert found["ci95"].tolist() == pytest.approx([4.302653 * sd / math.sqrt(2.0), 4.302653 * sd], rel=1e-5)
 
 
 def test_spread_is_that_of_2000_spheres_whatever_the_size() -> None:
