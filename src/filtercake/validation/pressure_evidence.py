@@ -17,12 +17,13 @@ import pandas as pd
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing.analytic_models import farr_groot
 from filtercake.packing.representation import merge_rare
-from filtercake.statistics import Spread, pooled_spread, quantile, standard_error
+from filtercake.statistics import Spread, difference_half_width, half_width, pooled_spread, quantile, standard_error
 from filtercake.units import FloatArray
 from filtercake.validation.pressure import (
     ALUM_SPHERES,
     COLLAPSE,
     COLLAPSED,
+    COLUMN,
     COMPARED,
     COST,
     FRICTION,
@@ -30,9 +31,11 @@ from filtercake.validation.pressure import (
     INVARIANCE,
     PATHS,
     SCALING,
+    UNIAXIAL,
     alum,
     pmma,
 )
+from filtercake.validation.pressure_column import EDGES, SLICES
 
 CELL_COLUMNS: Final = ("section", "case", "label", "spheres", "friction", "cohesion_kJ_m3", "stress_Pa", "load")
 """What an ensemble, or a stage of it, has in common."""
@@ -44,6 +47,10 @@ UNMOVED: Final = {0.0: 0.002, 0.05: 0.002, 0.3: 0.005}
 """Changes of porosity up to which a cell does not depend on how it was made, by friction."""
 SHARP: Final = 0.0007
 """Standard error that each mean of the tables of collapse and invariance should have."""
+AS_COLUMN: Final = 0.004
+"""Difference of a column's slice from cells of the same load up to which they are the same."""
+COLUMN_COHESION: Final = 50.0
+"""Cohesion of columns, kJ/m3, and of the cells that they are held against."""
 NARROW: Final = 0.0012
 """Largest standard deviation of one packing of 2000, without friction."""
 HALF_WIDTH: Final = 0.002
@@ -320,6 +327,43 @@ def changes(cells: pd.DataFrame, section: str) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def columns(cells: pd.DataFrame) -> pd.DataFrame:
+    """Hold slices of columns under raised gravity against cells of the same load.
+
+    Returns
+    -------
+    DataFrame
+        By friction and load: n, rejected, porosity of the slices, its 95 % half-width; of cells pressed from all sides
+        and along one axis (``cell`` and ``axial``) n, porosity, 95 % half-width, and change (slice minus cell) with its
+        own; and ``limit`` and ``holds`` where something was expected. Empty where there are no columns.
+    """
+    rows = []
+    here = cells[cells["cohesion_kJ_m3"] == COLUMN_COHESION]
+    for friction, load in itertools.product(FRICTIONS, SLICES):
+        same = here[(here["friction"] == friction) & np.isclose(here["load"], load)]
+        group = same[same["section"] == COLUMN]
+        if group.empty:
+            continue
+        mine = accepted(group)["porosity"]
+        row: dict[str, Any] = {"friction": friction, "load": load, "n": len(mine), "rejected": len(group) - len(mine)}
+        row |= {"porosity": float(mine.mean()), "ci95": half_width(mine), "limit": math.nan, "holds": True}
+        for name, ways in (("cell", same[same["section"] == COLLAPSE]), ("axial", same[same["label"] == UNIAXIAL])):
+            other = accepted(ways)["porosity"]
+            row |= {f"n_{name}": len(other), name: float(other.mean()), f"{name}_ci95": half_width(other)}
+            row[f"{name}_change"] = row["porosity"] - row[name]
+            row[f"{name}_change_ci95"] = difference_half_width(mine, other)
+        if load == SLICES[-1]:
+            row |= {"limit": AS_COLUMN, "holds": abs(row["cell_change"]) <= AS_COLUMN}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def slice_bias(friction: float) -> float:
+    """Porosity averaged over the loads of a column's lowest slice, less that at its mean load, by the earlier fit."""
+    loads = np.linspace(*EDGES[-2:], 601)
+    return float(fitted(loads, friction).mean() - fitted(np.array([SLICES[-1]]), friction)[0])
+
+
 def cost(cells: pd.DataFrame) -> pd.DataFrame:
     """Work out what a 95 % half-width of ``HALF_WIDTH`` costs by each way to pack.
 
@@ -411,6 +455,7 @@ def unmet(cells: pd.DataFrame) -> tuple[list[str], int]:
         *_said_of_friction(means),
         *_said_of_loads(cells),
         *_said_of_changes(changes(cells, INVARIANCE)),
+        *_said_of_columns(columns(cells)),
         *_said_of_cost(cells),
     ]
     return [text for holds, text in said if not holds], len(said)
@@ -476,6 +521,22 @@ def _said_of_errors(table: pd.DataFrame, what: str) -> _Said:
         text = f"standard errors of {what} at friction {friction:g}: up to {worst:.4f}, at most {SHARP} wanted"
         said.append((worst <= SHARP, f"{text}, for want of cells"))
     return said
+
+
+def _said_of_columns(table: pd.DataFrame) -> _Said:
+    return [
+        (
+            row["holds"],
+            _too_far(
+                f"column against cells, x = {row['load']:g}, friction {row['friction']:g}",
+                row["cell_change"],
+                row["cell_change_ci95"],
+                row["limit"],
+            ),
+        )
+        for row in _rows(table)
+        if math.isfinite(row["limit"])
+    ]
 
 
 def _said_of_cost(cells: pd.DataFrame) -> _Said:
