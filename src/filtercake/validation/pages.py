@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -209,7 +210,8 @@ def pressure(template: Path, cells: pd.DataFrame) -> str:
         gravity=_records(pressure_evidence.changes(cells, GRAVITY_BED)),
         columns=_records(pressure_evidence.columns(cells)),
         floor_load=pressure_column.FLOOR_LOAD,
-        edges=pressure_column.EDGES,
+        slices=list(itertools.pairwise(pressure_column.EDGES)),
+        balance=pressure_column.BALANCE,
         slice_bias={friction: pressure_evidence.slice_bias(friction) for friction in pressure_evidence.FITS},
         costs=_records(costs),
         gains=_records(pressure_evidence.gains(costs)),
