@@ -127,7 +127,7 @@ stability: setup ## stress tests of both engines: docs/stability.md (about 30 mi
 permeability: setup ## Stokes flow through packings, the evidence on the resistance law: docs/permeability.md (about 40 min on one core; goes on where it was stopped)
 	$(PERMEABILITY)
 
-pressure: setup ## ensembles of pressure cells, the evidence on them: docs/pressure.md (about 20 min on 2 cores; goes on where it was stopped)
+pressure: setup ## ensembles of pressure cells, beds and LIGGGHTS columns, the evidence on them: docs/pressure.md (about 40 min on 2 cores; goes on where it was stopped)
 	$(PRESSURE) --processes $(CORES)
 	$(BIN)/python -m filtercake.validation.figures.protocols --output docs/images/protocols.png
 

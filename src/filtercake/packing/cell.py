@@ -1,8 +1,9 @@
-"""The pressure cell: spheres in a box periodic in all directions, brought to an isotropic stress and to rest.
+"""The pressure cell: spheres in a box periodic in all directions, brought to a stress and to rest.
 
 A cake is packed by the pressure of filtration, from a slurry in which no crystal ever falls freely. So nothing falls
-here: a random cloud at rest in a viscous fluid is squeezed by a servo on the side of its box, without gravity, floor or
-surface, until its contacts carry the stress asked for. Contacts are those of the embedded engine.
+here: a random cloud at rest in a viscous fluid is squeezed by a servo on the sides of its box, without gravity, floor
+or surface, until its contacts carry the stress asked for. Contacts are those of the embedded engine. The stress is
+isotropic, or that along z, where only this side gives way, as in a filter.
 
 The structure depends on the sizes, the friction and two ratios alone, stress over the contacts' strength and stress
 over their stiffness (:mod:`filtercake.packing.similarity`), and hardly on the second where that is small: porosities
@@ -27,6 +28,8 @@ from filtercake.errors import CellError, TimeLimitReached
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import class_radii, place_spheres
 from filtercake.packing.result import publish
+from filtercake.packing.scene import CELL_VOID_FRACTION
+from filtercake.packing.settling import TYPICAL_SOLIDS
 from filtercake.packing.similarity import LARGEST_LOAD, check_rigid
 from filtercake.units import FloatArray
 
@@ -70,7 +73,7 @@ class CellScene:
     radius : ndarray, shape (n,)
         Radii, m, the largest first.
     stress : float
-        Isotropic stress to be reached, Pa, at the modulus below (:func:`filtercake.packing.similarity.similar`).
+        Stress to be reached, Pa, isotropic or along z, at the modulus below.
     density : float
         Crystal density, kg/m3.
     friction, restitution : float
@@ -99,6 +102,8 @@ class CellScene:
         longer time steps for a wide distribution.
     patience : int
         Time steps after which a cell that is not at rest is given up.
+    uniaxial : bool
+        Whether the box gives way along z only, to ``stress`` along z; across it the stress is what the spheres pass on.
     """
 
     radius: FloatArray
@@ -111,12 +116,13 @@ class CellScene:
     youngs_modulus: float = 5e6
     poisson_ratio: float = 0.2
     seed: int = 1
-    void_fraction: float = 0.65
+    void_fraction: float = CELL_VOID_FRACTION
     drag: float = 2.0
     servo: float = 1e-2
     time_step_rayleigh: float = 0.0
     mass_scaling: bool = False
     patience: int = 150_000
+    uniaxial: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what no cell can be made of, and what leaves the rigid limit."""
@@ -161,6 +167,18 @@ class CellScene:
     def solids(self) -> float:
         """Volume of the spheres, m3."""
         return 4.0 / 3.0 * math.pi * float(np.sum(self.radius**3))
+
+    @property
+    def cloud_sides(self) -> FloatArray:
+        """Sides of the cloud's box, m, shape (3,): a cube, or what will be about one once it is pressed along z."""
+        volume = self.solids / (1.0 - self.void_fraction)
+        slender = TYPICAL_SOLIDS / (1.0 - self.void_fraction) if self.uniaxial else 1.0
+        side = (volume / slender) ** (1.0 / 3.0)
+        return np.array([side, side, slender * side])
+
+    def held(self, look: Look) -> float:
+        """Stress that the servo holds, Pa."""
+        return float(look.stress[2, 2]) if self.uniaxial else look.pressure
 
     @property
     def rate(self) -> float:
@@ -256,8 +274,8 @@ class PressedCell:
         Centres in the box, m, in the order of the scene's radii.
     radius : ndarray, shape (n,)
         Radii, m.
-    length : float
-        Side of the box, m.
+    length, height : float
+        Sides of the box along x and y, and along z, m; different only where it was pressed along z.
     last : Look
         What was found at the end: stress, porosities, coordination, balance.
     steps : int
@@ -271,10 +289,16 @@ class PressedCell:
     position: FloatArray
     radius: FloatArray
     length: float
+    height: float
     last: Look
     steps: int
     wall_time: float
     reasons: tuple[str, ...]
+
+    @property
+    def sides(self) -> FloatArray:
+        """Sides of the box, m, shape (3,)."""
+        return np.array([self.length, self.length, self.height])
 
     @property
     def accepted(self) -> bool:
@@ -391,9 +415,9 @@ class _Run:
             self.looks = [*self.looks, box.look()][-1 - WINDOW_STEPS // CHECK_STEPS :]
             self._watch()
         position, last = box.positions(), self.looks[-1]
-        reasons = (*unrest(scene, self.looks), *refusals(scene, last, position, box.length))
+        reasons = (*unrest(scene, self.looks), *refusals(scene, last, position, box.sides))
         steps, spent = box.step - self.first, self.spent - since
-        self.found.append(PressedCell(position, scene.radius, box.length, last, steps, spent, reasons))
+        self.found.append(PressedCell(position, scene.radius, box.length, box.height, last, steps, spent, reasons))
 
     def _watch(self) -> None:
         """Stop at the time limit; save and report now and then."""
@@ -415,8 +439,9 @@ class _Run:
         from filtercake.packing.cell_box import CellBox
 
         scene = self.stages[0]
-        side = (scene.solids / (1.0 - scene.void_fraction)) ** (1.0 / 3.0)
-        return CellBox(scene, place_spheres(scene.radius, side, side, scene.seed, periodic=True), side)
+        sides = scene.cloud_sides
+        cloud = place_spheres(scene.radius, float(sides[0]), float(sides[2]), scene.seed, periodic=True)
+        return CellBox(scene, cloud, sides)
 
     def _save(self) -> None:
         self.saved = time.monotonic()
@@ -427,7 +452,7 @@ class _Run:
             "first": self.first,
             "spent": self.spent,
             "looks": [_plain(look) for look in self.looks],
-            "found": [[cell.length, _plain(cell.last), cell.steps, cell.wall_time] for cell in self.found],
+            "found": [[cell.length, cell.height, _plain(cell.last), cell.steps, cell.wall_time] for cell in self.found],
         }
         with publish(self.state_file) as temporary, temporary.open("wb") as stream:
             np.savez(stream, plain=json.dumps(plain), **past, **self.box.saved())
@@ -440,8 +465,10 @@ class _Run:
             with np.load(self.state_file) as data:
                 plain = json.loads(str(data["plain"]))
                 self.found = [
-                    PressedCell(data[f"position_{k}"], self.stages[k].radius, length, Look.of(last), steps, spent, ())
-                    for k, (length, last, steps, spent) in enumerate(plain["found"])
+                    PressedCell(
+                        data[f"position_{k}"], self.stages[k].radius, length, height, Look.of(last), steps, spent, ()
+                    )
+                    for k, (length, height, last, steps, spent) in enumerate(plain["found"])
                 ]
                 self.box.lead_to(self.stages[len(self.found)])
                 self.box.restore({name: data[name] for name in data.files})
@@ -469,10 +496,11 @@ def unrest(scene: CellScene, looks: list[Look]) -> list[str]:
     """
     last, window = looks[-1], looks[-1 - WINDOW_STEPS // CHECK_STEPS :]
     found = []
-    off = (last.pressure - scene.stress) / scene.stress
+    held = scene.held(last)
+    off = (held - scene.stress) / scene.stress
     if not abs(off) < STRESS_TOLERANCE:
         found.append(
-            f"stress {last.pressure:.4g} Pa after {last.step:,} steps: must be within {STRESS_TOLERANCE:g} "
+            f"stress {held:.4g} Pa after {last.step:,} steps: must be within {STRESS_TOLERANCE:g} "
             f"of {scene.stress:.4g} Pa"
         )
     balanced = last.force_ratio < FORCE_TOLERANCE and (last.force_ratio < max(window[0].force_ratio, BALANCED))
@@ -490,7 +518,7 @@ def unrest(scene: CellScene, looks: list[Look]) -> list[str]:
     return found
 
 
-def refusals(scene: CellScene, last: Look, position: FloatArray, length: float) -> list[str]:
+def refusals(scene: CellScene, last: Look, position: FloatArray, sides: FloatArray | float) -> list[str]:
     """Say why a cell at rest is no packing under the stress asked for; nothing when it is one.
 
     Parameters
@@ -501,20 +529,21 @@ def refusals(scene: CellScene, last: Look, position: FloatArray, length: float) 
         What was found at the end.
     position : ndarray, shape (n, 3)
         Centres, m.
-    length : float
-        Side of the box, m.
+    sides : ndarray, shape (3,), or float
+        Sides of the box, m.
     """
     found = []
-    if position.shape != (scene.radius.size, 3) or not ((position >= 0.0) & (position < length)).all():
+    if position.shape != (scene.radius.size, 3) or not ((position >= 0.0) & (position < sides)).all():
         found.append(f"{scene.radius.size} spheres were put in, and not all are in the box")
-    if not last.pressure / scene.modulus <= 1.01 * LARGEST_LOAD:
+    held = scene.held(last)
+    if not held / scene.modulus <= 1.01 * LARGEST_LOAD:
         found.append(
-            f"stress over E* = {last.pressure / scene.modulus:.2g}: must be at most {LARGEST_LOAD:g} "
+            f"stress over E* = {held / scene.modulus:.2g}: must be at most {LARGEST_LOAD:g} "
             "(the limit of rigid spheres)"
         )
     area = scene.radius**2
     limit = ANISOTROPY_LIMIT * math.sqrt(float(np.sum(area**2))) / float(np.sum(area))
-    if not last.anisotropy <= limit:
+    if not (scene.uniaxial or last.anisotropy <= limit):
         found.append(
             f"stress deviates by {last.anisotropy:.2g} of itself from an isotropic one: must be at most {limit:.2g}"
         )

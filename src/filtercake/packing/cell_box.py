@@ -25,7 +25,7 @@ LISTING_STEPS: Final = 250
 _STATE_ARRAYS: Final = ("spheres", "velocity", "spin", "drag", "identity", "level", "box")
 _LISTED: Final = ("first", "last", "neighbour", "spring")
 LEAST_SIDES: Final = 2.0
-"""Side of the box over the largest diameter and the skin: any two spheres touch at one image only."""
+"""Shortest side of the box over the largest diameter and the skin: any two spheres touch at one image only."""
 
 
 class _Found(NamedTuple):
@@ -42,8 +42,11 @@ class CellBox:
     Rows of the arrays are sorted in space at every listing; ``identity`` says which sphere of the scene each is.
     """
 
-    def __init__(self, scene: CellScene, position: FloatArray, length: float):
-        """Start at rest from centres (n, 3), m, in the order of the scene's radii, in a box of side ``length``, m."""
+    def __init__(self, scene: CellScene, position: FloatArray, sides: FloatArray | float):
+        """Start at rest from centres (n, 3), m, in the order of the scene's radii, in a box of these sides (3,), m.
+
+        One number is the side of a cube.
+        """
         n = scene.radius.size
         self.scene, self.step = scene, 0
         self.frictional = scene.friction > 0.0
@@ -57,7 +60,7 @@ class CellBox:
         )
         self.smallest = 2.0 * float(scene.radius.min())
         self.widest = 2.0 * float(scene.radius.max())
-        self.box = np.array([length, 0.0])
+        self.box = np.array([np.full(3, sides), np.zeros(3)])
         self.find_pairs = kernels.make_find_pairs(False)
         self.room = 8 * n
         self.listed_at = 0
@@ -72,20 +75,37 @@ class CellBox:
         Drag and servo follow from the stress.
         """
         self.scene, self.law = scene, _law(scene)
-        self.kernel = cell_kernels.make_advance(_attraction(scene), self.frictional)
+        self.kernel = cell_kernels.make_advance(_attraction(scene), self.frictional, scene.uniaxial)
         self.averages = cell_kernels.make_measure(_attraction(scene), self.frictional)
-        self.servo = cell_kernels.Servo(scene.stress, scene.servo * scene.rate / 3.0)
+        # the volume changes as fast, whether one side does or three
+        self.servo = cell_kernels.Servo(scene.stress, scene.servo * scene.rate / (1.0 if scene.uniaxial else 3.0))
         self.drag[:] = (scene.drag * scene.rate / scene.heaviness)[self.identity]
 
     @property
+    def sides(self) -> FloatArray:
+        """Sides of the box, m, shape (3,)."""
+        return np.asarray(self.box[0])
+
+    @property
     def length(self) -> float:
-        """Side of the box, m."""
-        return float(self.box[0])
+        """Side of the box along x and y, m."""
+        return float(self.box[0, 0])
+
+    @property
+    def height(self) -> float:
+        """Side of the box along z, m."""
+        return float(self.box[0, 2])
+
+    @property
+    def volume(self) -> float:
+        """Volume of the box, m3."""
+        # in this order the volume of a cube is the cube of its side to the last bit
+        return self.length**3 * (self.height / self.length)
 
     def positions(self) -> FloatArray:
         """Centres in the box, m, shape (n, 3), in the order of the scene's radii."""
         found = np.empty_like(self.velocity)
-        found[self.identity] = _wrapped(self.spheres[:, :3], self.length)
+        found[self.identity] = _wrapped(self.spheres[:, :3], self.sides)
         return found
 
     def momentum(self) -> FloatArray:
@@ -124,11 +144,12 @@ class CellBox:
             "owner": self.motion.owner,
             "shift": self.motion.shift,
             "reference": self.reach.reference,
+            "reference_sides": self.reach.sides,
         }
         lists |= {f"pairs_{name}": getattr(self.pairs, name) for name in _LISTED}
         if self._partners is not None:
             lists["partners"] = self._partners.neighbour
-        numbers = np.array([self.step, self.listed_at, self.room, self.skin, self.reach.length])
+        numbers = np.array([self.step, self.listed_at, self.room, self.skin])
         return {**arrays, **lists, "numbers": numbers}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -147,13 +168,13 @@ class CellBox:
         if self.frictional:
             self._partners = self.pairs._replace(neighbour=np.array(saved["partners"]))
         self.reach = cell_kernels.Reach(
-            np.array(saved["reference"]), float(saved["numbers"][4]), self.skin, self.widest
+            np.array(saved["reference"]), np.array(saved["reference_sides"]), self.skin, self.widest
         )
 
     def look(self) -> Look:
         """Take the averages of the present state."""
         found = self.averages(self.bodies, self.motion, self.pairs, self.law)
-        porosity = 1.0 - self.scene.solids / self.length**3
+        porosity = 1.0 - self.scene.solids / self.volume
         return Look(
             step=self.step,
             stress=found.stress,
@@ -167,15 +188,16 @@ class CellBox:
     def _list_pairs(self) -> None:
         """Sort the spheres in space and list their pairs anew; tangential springs are carried over."""
         self.skin, self.listed_at = self._choose_skin(), self.step
-        if self.length < LEAST_SIDES * (self.widest + self.skin):
+        narrowest = float(self.sides.min())
+        if narrowest < LEAST_SIDES * (self.widest + self.skin):
             raise CellError(
-                f"the box, {self.length / MICROMETRE:.4g} um, is narrower than {LEAST_SIDES:g} of its largest "
+                f"the box, {narrowest / MICROMETRE:.4g} um, is narrower than {LEAST_SIDES:g} of its largest "
                 f"spheres ({self.widest / MICROMETRE:.4g} um) and the neighbour skin; use more spheres than "
                 f"{self.identity.size}"
             )
-        self.spheres[:, :3] = _wrapped(self.spheres[:, :3], self.length)
+        self.spheres[:, :3] = _wrapped(self.spheres[:, :3], self.sides)
         order = kernels.sort_into_cells(
-            self.spheres, np.zeros_like(self.level), self.largest[:1], self.length, self.length
+            self.spheres, np.zeros_like(self.level), self.largest[:1], self.length, self.height
         )[0]
         for array in (self.spheres, self.velocity, self.spin, self.drag, self.identity, self.level):
             array[:] = array[order]
@@ -187,7 +209,7 @@ class CellBox:
         low, high = (share * self.smallest for share in SKIN_DIAMETERS)
         wanted = self.skin * LISTING_STEPS / lasted if lasted else self.skin
         # a box of few spheres has little room to list
-        high = max(min(high, self.length / LEAST_SIDES - self.widest), low)
+        high = max(min(high, float(self.sides.min()) / LEAST_SIDES - self.widest), low)
         return min(max(wanted, low), high)
 
     def _search(self) -> _Found:
@@ -196,7 +218,7 @@ class CellBox:
         above = np.flatnonzero(self.spheres[:, kernels.Z] < self.spheres[:, 3] + 0.5 * self.widest + self.skin)
         owner = np.concatenate([np.arange(n), above])
         rows = self.spheres[owner]
-        rows[n:, kernels.Z] += length
+        rows[n:, kernels.Z] += self.height
         level = self.level[owner]
         cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
         top = float(rows[:, kernels.Z].max())
@@ -248,7 +270,7 @@ class CellBox:
             if self._partners is not None:
                 kernels.carry_springs(order, self._partners, partners)
             self._partners = partners
-        self.reach = cell_kernels.Reach(self.spheres[:, :3].copy(), self.length, self.skin, self.widest)
+        self.reach = cell_kernels.Reach(self.spheres[:, :3].copy(), self.sides.copy(), self.skin, self.widest)
 
     def _work_on(
         self,
@@ -272,10 +294,10 @@ class CellBox:
         )
 
 
-def _wrapped(position: FloatArray, length: float) -> FloatArray:
-    """Centres in [0, length), m."""
-    found = position % length
-    found[found >= length] = 0.0
+def _wrapped(position: FloatArray, sides: FloatArray) -> FloatArray:
+    """Centres in the box, from 0 to less than its sides, m."""
+    found = position % sides
+    found[found >= sides] = 0.0
     return np.asarray(found)
 
 

@@ -1,9 +1,9 @@
 """Compiled kernels of the pressure cell: periodic images, the servo on the box, and the averages that judge rest.
 
 All in SI. Contacts are the embedded engine's, and so are the half steps of the velocity. Here a velocity is that
-relative to the box, which shrinks or grows about its corner at ``rate`` (1/s): the state that the contacts see holds
-``v + rate x``. A sphere with contacts across a face of the box appears again as an image, a row behind the
-spheres, whose forces are the sphere's own.
+relative to the box, which shrinks or grows about its corner at ``rate`` (1/s) along each axis: the state that the
+contacts see holds ``v + rate x``. A sphere with contacts across a face of the box appears again as an image, a row
+behind the spheres, whose forces are the sphere's own.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Motion(NamedTuple):
         The sphere that each image is of.
     shift : ndarray, shape (images, 3)
         Where the image lies, in sides of the box from its sphere.
-    box : ndarray, shape (2,)
-        Side of the box, m, and its rate of growth, 1/s; both change.
+    box : ndarray, shape (2, 3)
+        Sides of the box, m, and their rates of growth, 1/s; both change.
     """
 
     velocity: FloatArray
@@ -47,7 +47,7 @@ class Motion(NamedTuple):
 
 
 class Servo(NamedTuple):
-    """The stress that the box is led to, Pa, and its fastest rate of growth, 1/s."""
+    """The stress that the box is led to, Pa, and the fastest rate at which a side grows or shrinks, 1/s."""
 
     stress: float
     fastest: float
@@ -56,12 +56,12 @@ class Servo(NamedTuple):
 class Reach(NamedTuple):
     """How far spheres may move before the pairs are listed anew.
 
-    ``reference`` (n, 3) and ``length``, m, are the positions and the side of the box when they were listed; pairs
+    ``reference`` (n, 3) and ``sides`` (3,), m, are the positions and the sides of the box when they were listed; pairs
     closer than ``skin`` are listed, and ``widest`` is the largest distance of two centres that touch, m.
     """
 
     reference: FloatArray
-    length: float
+    sides: FloatArray
     skin: float
     widest: float
 
@@ -97,18 +97,17 @@ _compiled = cached_njit(error_model="numpy", fastmath=FUSED)
 @_compiled
 def place_images(bodies: kernels.Bodies, motion: Motion, frictional: bool) -> None:
     """Put what the contacts see into the state: velocities in a box that deforms, and the images."""
-    state, spin, velocity = bodies.state, bodies.spin, motion.velocity
-    length, rate = motion.box[0], motion.box[1]
+    state, spin, velocity, box = bodies.state, bodies.spin, motion.velocity, motion.box
     n = velocity.shape[0]
     for i in range(n):
         for k in range(3):
-            state[i, U + k] = velocity[i, k] + rate * state[i, X + k]
+            state[i, U + k] = velocity[i, k] + box[1, k] * state[i, X + k]
     for g in range(motion.owner.size):
         i = motion.owner[g]
         for k in range(3):
-            away = motion.shift[g, k] * length
+            away = motion.shift[g, k] * box[0, k]
             state[n + g, X + k] = state[i, X + k] + away
-            state[n + g, U + k] = state[i, U + k] + rate * away
+            state[n + g, U + k] = state[i, U + k] + box[1, k] * away
             if frictional:
                 spin[n + g, k] = spin[i, k]
 
@@ -148,11 +147,19 @@ def _trace(bodies: kernels.Bodies) -> float:
 
 
 @_compiled
+def _axial(bodies: kernels.Bodies) -> float:
+    """Sum over spheres and images of height times vertical force, N m: the volume times the stress along the axis."""
+    total = 0.0
+    for i in range(bodies.state.shape[0]):
+        total += bodies.state[i, X + 2] * bodies.force[0, i, 2]
+    return total
+
+
+@_compiled
 def move(bodies: kernels.Bodies, motion: Motion, time_step: float, frictional: bool) -> float:
     """Kick and move the spheres and the box by one step; return the largest speed in the box, m/s."""
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     velocity, box = motion.velocity, motion.box
-    rate = box[1]
     fastest = 0.0
     for i in range(velocity.shape[0]):
         half = 0.5 * motion.drag[i] * time_step
@@ -162,33 +169,38 @@ def move(bodies: kernels.Bodies, motion: Motion, time_step: float, frictional: b
             v = keep * velocity[i, k] + kick * force[i, k]
             velocity[i, k] = v
             square += v * v
-            state[i, X + k] += time_step * (v + rate * state[i, X + k])
+            state[i, X + k] += time_step * (v + box[1, k] * state[i, X + k])
         fastest = max(fastest, square)
         if frictional:
             turn = kick / (0.4 * state[i, RADIUS] * state[i, RADIUS])
             for k in range(3):
                 spin[i, k] = keep * spin[i, k] + turn * torque[i, k]
-    box[0] *= 1.0 + rate * time_step
+    for k in range(3):
+        box[0, k] *= 1.0 + box[1, k] * time_step
     return math.sqrt(fastest)
 
 
 @_compiled
-def room_left(state: FloatArray, length: float, reach: Reach) -> float:
+def room_left(state: FloatArray, sides: FloatArray, reach: Reach) -> float:
     """Way, m, by which no pair that is not listed has come too near, from how spheres have moved in the box."""
-    scale = length / reach.length
+    scales = sides / reach.sides
+    scale = float(min(scales[0], scales[1], scales[2]))  # no distance in the box shrinks by more
     farthest = 0.0
     for i in range(reach.reference.shape[0]):
         square = 0.0
         for k in range(3):
-            moved = state[i, X + k] - scale * reach.reference[i, k]
+            moved = state[i, X + k] - scales[k] * reach.reference[i, k]
             square += moved * moved
         farthest = max(farthest, square)
     return scale * reach.skin - max(1.0 - scale, 0.0) * reach.widest - 2.0 * math.sqrt(farthest)
 
 
 @cache
-def make_advance(attraction: int, frictional: bool) -> Callable[..., tuple[int, bool]]:
-    """Compile the time loop for one kind of scene: what it doesn't need is not in its code."""
+def make_advance(attraction: int, frictional: bool, uniaxial: bool) -> Callable[..., tuple[int, bool]]:
+    """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
+
+    A ``uniaxial`` box is led to a stress along z, and keeps its other sides.
+    """
 
     @cached_njit(error_model="numpy", fastmath=FUSED)
     def advance(
@@ -210,11 +222,15 @@ def make_advance(attraction: int, frictional: bool) -> Callable[..., tuple[int, 
             place_images(bodies, motion, frictional)
             _clear(bodies, frictional)
             kernels.pair_forces(0, bodies, pairs, law, time_step, attraction, frictional)
-            pressure = _trace(bodies) / (3.0 * box[0] ** 3)
+            volume = box[0, 0] * (box[0, 1] * box[0, 2])
+            pressure = _axial(bodies) / volume if uniaxial else _trace(bodies) / (3.0 * volume)
             gather(bodies, motion, frictional)
-            box[1] = servo.fastest * min(max((pressure - servo.stress) / servo.stress, -1.0), 1.0)
+            rate = servo.fastest * min(max((pressure - servo.stress) / servo.stress, -1.0), 1.0)
+            box[1, 2] = rate
+            if not uniaxial:
+                box[1, 0] = box[1, 1] = rate
             speed = move(bodies, motion, time_step, frictional)
-            room -= time_step * (2.0 * speed + abs(box[1]) * (reach.widest + reach.skin))
+            room -= time_step * (2.0 * speed + abs(rate) * (reach.widest + reach.skin))
             if not room > 0.0:
                 room = room_left(bodies.state, box[0], reach)
                 if not room > LEAST_ROOM * reach.skin:
@@ -288,7 +304,8 @@ def make_measure(attraction: int, frictional: bool) -> Callable[..., Averages]:
         for i in range(n):
             net += math.sqrt(force[i, 0] * force[i, 0] + force[i, 1] * force[i, 1] + force[i, 2] * force[i, 2])
         many = max(contacts, 1)
-        return Averages(stress / motion.box[0] ** 3, net / n, total / many, contacts, overlap / many)
+        volume = motion.box[0, 0] * (motion.box[0, 1] * motion.box[0, 2])
+        return Averages(stress / volume, net / n, total / many, contacts, overlap / many)
 
     compiled: Callable[..., Averages] = measure
     return compiled

@@ -32,8 +32,6 @@ STRESS_OVER_MODULUS: Final = 3.4e-5
 """Highest simulated stress over E*: that of 53 kPa on crystals of 3 GPa. Six times as much packs denser by 0.004."""
 PATIENCE: Final = 400_000
 """Time steps after which a cell that is not at rest is given up; one of 2000 spheres took 140 000 at the first load."""
-VOID_FRACTION: Final = 0.65
-"""Of the cloud that a cell is pressed from; a denser one packs denser with friction."""
 STRENGTH_OVER_MODULUS: Final = 9e-6
 """Strongest simulated attraction, p_c over E*."""
 
@@ -140,7 +138,6 @@ def stages(scene: Scene, loads: Sequence[float], seed: int) -> list[CellScene]:
         youngs_modulus=SIMULATED_MODULUS,
         poisson_ratio=scene.poisson_ratio,
         seed=seed,
-        void_fraction=VOID_FRACTION,
         time_step_rayleigh=scene.rayleigh_fraction,
         mass_scaling=scene.is_wide,
         patience=PATIENCE,

@@ -26,6 +26,8 @@ GRAVITY_PROTOCOL, FILTRATION_PROTOCOL = "gravity", "filtration"
 PROTOCOLS: Final = (GRAVITY_PROTOCOL, FILTRATION_PROTOCOL)
 OF_FILTRATION: Final = ("protocol", "pressure", "adhesion", "crystal_modulus")
 """What only pressed cakes have: it is not named where nothing is pressed."""
+CELL_VOID_FRACTION: Final = 0.65
+"""Void fraction of the cloud that a cell is pressed from; a denser one packs denser with friction."""
 INCIDENTAL: Final = ("processes", "time_limit", "write_vtk")
 """What does not decide a packing: it stands whatever these become."""
 _KINDS: Final = {"int": (int,), "float": (int, float), "str": (str,), "bool": (bool,)}
@@ -170,7 +172,7 @@ class Scene:
             pressure=1.0,
             crystal_modulus=1.0,
             bed_depth_factor=1.0,
-            initial_void_fraction=0.65,
+            initial_void_fraction=CELL_VOID_FRACTION,
             settling_velocity=0.0,
             skin=0.0,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +14,7 @@ from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.permeability.measure import SPREAD
 from filtercake.study import limits
 from filtercake.user_files import templates
-from filtercake.validation import pressure_evidence, resistance_law
+from filtercake.validation import pressure_column, pressure_evidence, resistance_law
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
 from filtercake.validation.permeability import BED, CELL, LATTICE, LAYERED, known_constant
 from filtercake.validation.pressure import GRAVITY_BED, INVARIANCE, MODULUS, PATH_STRESS, PATHS
@@ -207,6 +208,11 @@ def pressure(template: Path, cells: pd.DataFrame) -> str:
         paths=_records(pressure_evidence.paths(cells)),
         invariance=_records(pressure_evidence.changes(cells, INVARIANCE)),
         gravity=_records(pressure_evidence.changes(cells, GRAVITY_BED)),
+        columns=_records(pressure_evidence.columns(cells)),
+        floor_load=pressure_column.FLOOR_LOAD,
+        slices=list(itertools.pairwise(pressure_column.EDGES)),
+        balance=pressure_column.BALANCE,
+        slice_bias={friction: pressure_evidence.slice_bias(friction) for friction in pressure_evidence.FITS},
         costs=_records(costs),
         gains=_records(pressure_evidence.gains(costs)),
         scaling=_records(pressure_evidence.mass_scaling(cells)),

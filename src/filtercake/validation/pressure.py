@@ -1,4 +1,4 @@
-"""Evidence on the pressure cell: ensembles of cells, and of beds settled by the paper's protocol beside them.
+"""Evidence on the pressure cell: ensembles of cells, and of beds by the paper's protocol and columns beside them.
 
 What has been computed is kept under a digest of all that decides it, so that a run goes on where it was stopped and
 cases that ask for the same cell share it. A change of the cell's own code is not part of that: after one, the folder
@@ -26,18 +26,22 @@ from filtercake.api.steps import csd_name, distribution, load
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CellError, CloudError, EngineError
 from filtercake.packing import contact_law
-from filtercake.packing.cell import CellScene, PressedCell, press, press_through
+from filtercake.packing.cell import FRICTIONAL_STEP, FRICTIONLESS_STEP, CellScene, PressedCell, press, press_through
 from filtercake.packing.cloud import size_levels
 from filtercake.packing.engines.embedded import Embedded
+from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.packing.result import write_json
 from filtercake.packing.scene import Scene, digest
 from filtercake.study import engine_choice
 from filtercake.study.points import base_point
 from filtercake.units import GRAVITY, KILOJOULE_PER_M3, FloatArray, IntArray
+from filtercake.validation.pressure_column import Column, press_column
 from filtercake.validation.timing import contender, settle_timed, warm_up
 
 REFERENCES, FRICTION, COLLAPSE, PATHS = "references", "friction", "collapse", "paths"
 INVARIANCE, GRAVITY_BED, COST, SCALING = "invariance", "gravity", "cost", "mass scaling"
+COLUMN = "column"
+UNIAXIAL: Final = "pressed along one axis"
 
 MODULUS: Final = contact_law.effective_modulus(5e6, 0.2)
 """E* of all cells, Pa."""
@@ -63,6 +67,14 @@ ONE_SIZE: Final = {30.0: 1.0}
 """Volume fraction by diameter, um; neither decides anything of a cell."""
 COST_SEEDS: Final = 100
 """Seeds of what is timed begin behind this one: nothing in it is shared with a case that ran at another moment."""
+MEMBERS: Final = {0.0: 5, 0.05: 5, 0.3: 14}
+"""Cells of 2000 behind each mean of the tables of collapse and invariance, by friction.
+
+One spreads by 0.0010, 0.0013 and 0.0023."""
+COLUMNS_EACH: Final = 8
+"""Columns of 2000 spheres by friction."""
+COLUMN_DEPTH: Final = 2.0
+"""How many times deeper than the paper's bed a column is, in units of its side: ten largest diameters."""
 PATIENCE: Final = 800_000
 """Time steps that cells without mass scaling may take."""
 DENSITY: Final = 1180.0
@@ -89,6 +101,7 @@ COLUMNS: Final = (
 )
 
 Say = Callable[[str], None]
+Member = tuple[CellScene, ...] | Scene | Column
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +112,9 @@ class Case:
     ----------
     section, name, label : str
         Part of the evidence; slug; in words.
-    stages : tuple of CellScene, or Scene
-        What one cell is led through, or a bed that is settled; its seed is that of each member.
+    stages : tuple of CellScene, Scene, or Column
+        What one cell is led through, or a bed that is settled, or pressed by its weight; its seed is that of each
+        member.
     cells : int
         Members.
     """
@@ -108,14 +122,16 @@ class Case:
     section: str
     name: str
     label: str
-    stages: tuple[CellScene, ...] | Scene
+    stages: Member
     cells: int
 
-    def member(self, seed: int) -> tuple[CellScene, ...] | Scene:
+    def member(self, seed: int) -> Member:
         """Return what is computed for a seed, from 1."""
         own = seed + COST_SEEDS if self.section == COST else seed
         if isinstance(self.stages, Scene):
             return replace(self.stages, seed=own)
+        if isinstance(self.stages, Column):
+            return replace(self.stages, scene=replace(self.stages.scene, seed=own))
         return tuple(replace(stage, seed=own) for stage in self.stages)
 
 
@@ -133,6 +149,7 @@ def cases() -> list[Case]:
         *_paths(),
         *_scaling(),
         *_invariance(0.3),
+        *_columns(),
     ]
 
 
@@ -203,7 +220,7 @@ def _collapse() -> list[Case]:
             f"s{cohesion:.0f}_x{load_over_strength:g}_mu{friction:g}",
             f"{cohesion:.0f} kJ/m3",
             (cell(pmma(), cohesion=1e3 * cohesion, load=load_over_strength, friction=friction),),
-            3 if friction else 5,
+            MEMBERS[friction],
         )
         for friction in FRICTIONS
         for load_over_strength in COLLAPSED
@@ -232,10 +249,6 @@ def _weak(load_over_strength: float, friction: float) -> CellScene:
     return cell(pmma(), stress=PATH_STRESS, cohesion=cohesion, friction=friction)
 
 
-MEMBERS: Final = {0.0: 3, 0.05: 3, 0.3: 3}
-"""Cells of 2000 behind each mean of the table of invariance, by friction."""
-
-
 def _invariance(friction: float) -> list[Case]:
     base = cell(pmma(), cohesion=50e3, load=10.0, friction=friction)
     step = base.time_step / replace(base, time_step_rayleigh=0.1).time_step * 0.1
@@ -252,6 +265,7 @@ def _invariance(friction: float) -> list[Case]:
         ("spheres 2000 -> 1000", replace(base, radius=cell(pmma(), 1000).radius)),
         ("spheres 2000 -> 8000", replace(base, radius=cell(pmma(), 8000).radius)),
         ("time step halved", replace(base, time_step_rayleigh=0.5 * step)),
+        (UNIAXIAL, replace(base, uniaxial=True)),
     ]
     return [
         Case(INVARIANCE, f"mu{friction:g}_{k}", label, (scene,), _members(MEMBERS[friction], scene.radius.size))
@@ -288,6 +302,18 @@ def _gravity(friction: float) -> list[Case]:
         Case(GRAVITY_BED, f"bed{friction:g}_{k}", label, scene, _members(4, scene.particles))
         for k, (label, scene) in enumerate(changes)
     ]
+
+
+def _columns() -> list[Case]:
+    listed = []
+    for friction in FRICTIONS:
+        share = FRICTIONAL_STEP if friction > 0.0 else FRICTIONLESS_STEP
+        scene = bed(
+            {"mixture": {20.0: 0.5, 50.0: 0.5}}, friction=friction, particles=2000, bed_depth_factor=COLUMN_DEPTH
+        )
+        column = Column(replace(scene, engine=Liggghts.name).with_time_step(share)).without_impact()
+        listed.append(Case(COLUMN, f"column{friction:g}", "column under raised gravity", column, COLUMNS_EACH))
+    return listed
 
 
 def bed(source: Mapping[str, Any], **options: Any) -> Scene:
@@ -339,7 +365,7 @@ def _scaling() -> list[Case]:
 def compute(folder: Path, chosen: Iterable[Case], processes: int, say: Say = lambda _: None) -> pd.DataFrame:
     """Compute every member that ``folder`` does not hold yet, in several processes; one row, ``COLUMNS``, per stage."""
     folder.mkdir(parents=True, exist_ok=True)
-    listed = list(chosen)
+    listed = _possible(chosen, say)
     wanted = {kept_as(folder, case.member(seed)): (case, seed) for case, seed in _members_of(listed)}
     missing = [(path, *task) for path, task in wanted.items() if not path.exists()]
     # a kernel that numba compiles while another process forks is not there for it
@@ -353,6 +379,15 @@ def compute(folder: Path, chosen: Iterable[Case], processes: int, say: Say = lam
             pool.shutdown(cancel_futures=True)
             raise
     return table(folder, listed)
+
+
+def _possible(chosen: Iterable[Case], say: Say) -> list[Case]:
+    """Leave out columns where LIGGGHTS is missing."""
+    listed, missing = list(chosen), Liggghts().why_missing()
+    if missing is None or all(case.section != COLUMN for case in listed):
+        return listed
+    say(f"no columns: {missing}")
+    return [case for case in listed if case.section != COLUMN]
 
 
 def _said(rows: list[dict[str, Any]]) -> str:
@@ -376,20 +411,25 @@ def table(folder: Path, chosen: Iterable[Case]) -> pd.DataFrame:
 def _members_of(chosen: Iterable[Case]) -> Iterator[tuple[Case, int]]:
     """List members, all cases in turn: a change of the machine's pace hits all, and a stopped run has some of each."""
     listed = list(chosen)
-    for seed in range(1, max(case.cells for case in listed) + 1):
+    for seed in range(1, max((case.cells for case in listed), default=0) + 1):
         yield from ((case, seed) for case in listed if seed <= case.cells)
 
 
-def kept_as(folder: Path, member: tuple[CellScene, ...] | Scene) -> Path:
+def kept_as(folder: Path, member: Member) -> Path:
     """File of a member: its name is a digest of everything that decides it."""
+    if isinstance(member, Column):
+        return folder / f"{digest('column', member.scene.decisive(), member.load)[:24]}.json"
     if isinstance(member, Scene):
         return folder / f"{digest(member.decisive())[:24]}.json"
     content = [{**vars(stage), "radius": stage.radius.tolist()} for stage in member]
     return folder / f"{digest(content)[:24]}.json"
 
 
-def _keep(path: Path, member: tuple[CellScene, ...] | Scene) -> list[dict[str, Any]]:
-    rows = settled_rows(member) if isinstance(member, Scene) else pressed_rows(member)
+def _keep(path: Path, member: Member) -> list[dict[str, Any]]:
+    if isinstance(member, Column):
+        rows = column_rows(member)
+    else:
+        rows = settled_rows(member) if isinstance(member, Scene) else pressed_rows(member)
     write_json(path, {"rows": rows})
     return rows
 
@@ -424,7 +464,7 @@ def _asked(scene: CellScene) -> dict[str, Any]:
 
 
 def _row(scene: CellScene, found: PressedCell, seconds: float) -> dict[str, Any]:
-    contacts = _contacts(found.position, found.radius, found.length)
+    contacts = _contacts(found.position, found.radius, found.sides)
     fewest = FEWEST_CONTACTS[scene.friction > 0.0]
     coordination, rattlers = backbone(contacts, found.radius.size, fewest)
     return {
@@ -446,11 +486,11 @@ def _warm(frictional: bool, cohesive: bool) -> None:
     press(few)
 
 
-def _contacts(position: FloatArray, radius: FloatArray, length: float) -> IntArray:
+def _contacts(position: FloatArray, radius: FloatArray, sides: FloatArray) -> IntArray:
     """Pairs of spheres that overlap in a box periodic in all directions, shape (m, 2); searched by size level."""
     level = size_levels(radius)
     groups = [np.flatnonzero(level == k) for k in np.unique(level)]
-    trees = [scipy.spatial.cKDTree(position[group] % length, boxsize=np.full(3, length)) for group in groups]
+    trees = [scipy.spatial.cKDTree(position[group] % sides, boxsize=sides) for group in groups]
     found = []
     for a, coarse in enumerate(groups):
         for b in range(a, len(groups)):
@@ -499,20 +539,27 @@ def settled_rows(scene: Scene) -> list[dict[str, Any]]:
     found = settle_timed(made, 0)
     return [
         {
-            "spheres": scene.particles,
-            "friction": scene.friction,
-            "cohesion_kJ_m3": scene.cohesion / KILOJOULE_PER_M3,
-            "stress_Pa": None,
-            "load": None,
+            **_bed_asked(scene),
             "porosity": found["porosity"] if math.isfinite(found["porosity"]) else None,
-            "coordination": None,
-            "backbone": None,
-            "rattlers": None,
             "steps": found["steps"],
             "seconds": time.process_time() - started,
             "reason": "" if found["status"] == "ok" else found["status"],
         }
     ]
+
+
+def column_rows(column: Column) -> list[dict[str, Any]]:
+    """Press a column by its weight; a row, ``COLUMNS`` from spheres on, for each of its slices."""
+    return [{**_bed_asked(column.scene), **row} for row in press_column(column)]
+
+
+def _bed_asked(scene: Scene) -> dict[str, Any]:
+    asked = {
+        "spheres": scene.particles,
+        "friction": scene.friction,
+        "cohesion_kJ_m3": scene.cohesion / KILOJOULE_PER_M3,
+    }
+    return asked | dict.fromkeys(("stress_Pa", "load", "porosity", "coordination", "backbone", "rattlers"))
 
 
 @cache

@@ -17,12 +17,13 @@ import pandas as pd
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing.analytic_models import farr_groot
 from filtercake.packing.representation import merge_rare
-from filtercake.statistics import Spread, pooled_spread, quantile, standard_error
+from filtercake.statistics import Spread, difference_half_width, half_width, pooled_spread, quantile, standard_error
 from filtercake.units import FloatArray
 from filtercake.validation.pressure import (
     ALUM_SPHERES,
     COLLAPSE,
     COLLAPSED,
+    COLUMN,
     COMPARED,
     COST,
     FRICTION,
@@ -30,9 +31,11 @@ from filtercake.validation.pressure import (
     INVARIANCE,
     PATHS,
     SCALING,
+    UNIAXIAL,
     alum,
     pmma,
 )
+from filtercake.validation.pressure_column import EDGES, SLICES
 
 CELL_COLUMNS: Final = ("section", "case", "label", "spheres", "friction", "cohesion_kJ_m3", "stress_Pa", "load")
 """What an ensemble, or a stage of it, has in common."""
@@ -43,7 +46,11 @@ SAME: Final = {0.0: 0.003, 0.05: 0.003, 0.3: 0.005}
 UNMOVED: Final = {0.0: 0.002, 0.05: 0.002, 0.3: 0.005}
 """Changes of porosity up to which a cell does not depend on how it was made, by friction."""
 SHARP: Final = 0.0007
-"""Standard error that each mean of the table of invariance should have."""
+"""Standard error that each mean of the tables of collapse and invariance should have."""
+AS_COLUMN: Final = 0.004
+"""Difference of a column's slice from cells of the same load up to which they are the same."""
+COLUMN_COHESION: Final = 50.0
+"""Cohesion of columns, kJ/m3, and of the cells that they are held against."""
 NARROW: Final = 0.0012
 """Largest standard deviation of one packing of 2000, without friction."""
 HALF_WIDTH: Final = 0.002
@@ -169,6 +176,20 @@ def friction_series(means: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(solids=1.0 - rows["porosity"])
 
 
+def led(cells: pd.DataFrame) -> pd.DataFrame:
+    """Average the ways to a load, with 95 % half-widths from the spread of one packing, pooled by friction.
+
+    Returns
+    -------
+    DataFrame
+        The averages, and ``ci95``.
+    """
+    rows, spreads = averages(cells[cells["section"] == PATHS]), cell_spreads(cells)
+    one = [spreads[friction] for friction in rows["friction"]]
+    half = [quantile(each.freedom) * each.sd / math.sqrt(max(n, 1)) for each, n in zip(one, rows["n"], strict=True)]
+    return rows.assign(ci95=half)
+
+
 @dataclass(frozen=True)
 class Ensemble:
     """Mean of accepted packings.
@@ -214,7 +235,14 @@ def cell_spreads(cells: pd.DataFrame) -> dict[float, Spread]:
 
 
 def collapse(cells: pd.DataFrame) -> pd.DataFrame:
-    """Hold cohesions against each other at the same x: porosity of both, difference, its 95 % half-width, ``holds``."""
+    """Hold cohesions against each other at the same x.
+
+    Returns
+    -------
+    DataFrame
+        By friction and load: porosity of both, the larger standard error of the two, difference, its 95 % half-width,
+        ``holds``.
+    """
     rows, spreads = [], cell_spreads(cells)
     here = cells[cells["section"] == COLLAPSE]
     for friction, load in itertools.product(FRICTIONS, COLLAPSED):
@@ -229,6 +257,7 @@ def collapse(cells: pd.DataFrame) -> pd.DataFrame:
                 "rejected": weak.rejected + strong.rejected,
                 "weak": weak.porosity,
                 "strong": strong.porosity,
+                "se": max(_error(weak, spreads[friction]), _error(strong, spreads[friction])),
                 **found,
                 "limit": limit,
                 "holds": abs(found["change"]) <= limit,
@@ -293,9 +322,46 @@ def changes(cells: pd.DataFrame, section: str) -> pd.DataFrame:
                 "rejected": mine.rejected,
                 "porosity": mine.porosity,
             }
-            row |= {"se": one.sd / math.sqrt(mine.weight) if mine.n else math.nan, **found, "limit": limit}
+            row |= {"se": _error(mine, one), **found, "limit": limit}
             rows.append(row | {"holds": abs(found["change"]) <= limit})
     return pd.DataFrame(rows)
+
+
+def columns(cells: pd.DataFrame) -> pd.DataFrame:
+    """Hold slices of columns under raised gravity against cells of the same load.
+
+    Returns
+    -------
+    DataFrame
+        By friction and load: n, rejected, porosity of the slices, its 95 % half-width; of cells pressed from all sides
+        and along one axis (``cell`` and ``axial``) n, porosity, 95 % half-width, and change (slice minus cell) with its
+        own; and ``limit`` and ``holds`` where something was expected. Empty where there are no columns.
+    """
+    rows = []
+    here = cells[cells["cohesion_kJ_m3"] == COLUMN_COHESION]
+    for friction, load in itertools.product(FRICTIONS, SLICES):
+        same = here[(here["friction"] == friction) & np.isclose(here["load"], load)]
+        group = same[same["section"] == COLUMN]
+        if group.empty:
+            continue
+        mine = accepted(group)["porosity"]
+        row: dict[str, Any] = {"friction": friction, "load": load, "n": len(mine), "rejected": len(group) - len(mine)}
+        row |= {"porosity": float(mine.mean()), "ci95": half_width(mine), "limit": math.nan, "holds": True}
+        for name, ways in (("cell", same[same["section"] == COLLAPSE]), ("axial", same[same["label"] == UNIAXIAL])):
+            other = accepted(ways)["porosity"]
+            row |= {f"n_{name}": len(other), name: float(other.mean()), f"{name}_ci95": half_width(other)}
+            row[f"{name}_change"] = row["porosity"] - row[name]
+            row[f"{name}_change_ci95"] = difference_half_width(mine, other)
+        if load == SLICES[-1]:
+            row |= {"limit": AS_COLUMN, "holds": abs(row["cell_change"]) <= AS_COLUMN}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def slice_bias(friction: float) -> float:
+    """Porosity averaged over the loads of a column's lowest slice, less that at its mean load, by the earlier fit."""
+    loads = np.linspace(*EDGES[-2:], 601)
+    return float(fitted(loads, friction).mean() - fitted(np.array([SLICES[-1]]), friction)[0])
 
 
 def cost(cells: pd.DataFrame) -> pd.DataFrame:
@@ -353,11 +419,16 @@ def mass_scaling(cells: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def _error(mean: Ensemble, one: Spread) -> float:
+    """Work out the standard error of a mean from the spread of one packing of 2000."""
+    return one.sd / math.sqrt(mean.weight) if mean.n else math.nan
+
+
 def _change(usual: Ensemble, other: Ensemble, one: Spread) -> dict[str, float]:
     """Difference of two means and the half-width of its 95 % interval, from the spread of one packing of 2000."""
     if not (usual.n and other.n):
         return {"change": math.nan, "ci95": math.nan}
-    error = one.sd * math.sqrt(1.0 / usual.weight + 1.0 / other.weight)
+    error = math.hypot(_error(usual, one), _error(other, one))
     return {"change": other.porosity - usual.porosity, "ci95": quantile(one.freedom) * error}
 
 
@@ -384,6 +455,7 @@ def unmet(cells: pd.DataFrame) -> tuple[list[str], int]:
         *_said_of_friction(means),
         *_said_of_loads(cells),
         *_said_of_changes(changes(cells, INVARIANCE)),
+        *_said_of_columns(columns(cells)),
         *_said_of_cost(cells),
     ]
     return [text for holds, text in said if not holds], len(said)
@@ -416,8 +488,9 @@ def _said_of_friction(means: pd.DataFrame) -> _Said:
 
 
 def _said_of_loads(cells: pd.DataFrame) -> _Said:
-    said = []
-    for row in _rows(collapse(cells)):
+    same = collapse(cells)
+    said = _said_of_errors(same, "two cohesions")
+    for row in _rows(same):
         where = f"x = {row['load']:g}, friction {row['friction']:g}"
         said.append((row["holds"], _too_far(f"30 and 50 kJ/m3, {where}", row["change"], row["ci95"], row["limit"])))
     for row in _rows(paths(cells)):
@@ -431,7 +504,7 @@ def _said_of_loads(cells: pd.DataFrame) -> _Said:
 
 
 def _said_of_changes(table: pd.DataFrame) -> _Said:
-    said = [
+    return _said_of_errors(table, "ways to make a cell") + [
         (
             row["holds"],
             _too_far(f"{row['label']}, friction {row['friction']:g}", row["change"], row["ci95"], row["limit"]),
@@ -439,11 +512,31 @@ def _said_of_changes(table: pd.DataFrame) -> _Said:
         for row in _rows(table)
         if math.isfinite(row["ci95"])
     ]
+
+
+def _said_of_errors(table: pd.DataFrame, what: str) -> _Said:
+    said = []
     for friction, group in table.groupby("friction"):
         worst = float(group["se"].max())
-        text = f"standard errors at friction {friction:g}: up to {worst:.4f}, at most {SHARP} wanted, for want of cells"
-        said.append((worst <= SHARP, text))
+        text = f"standard errors of {what} at friction {friction:g}: up to {worst:.4f}, at most {SHARP} wanted"
+        said.append((worst <= SHARP, f"{text}, for want of cells"))
     return said
+
+
+def _said_of_columns(table: pd.DataFrame) -> _Said:
+    return [
+        (
+            row["holds"],
+            _too_far(
+                f"column against cells, x = {row['load']:g}, friction {row['friction']:g}",
+                row["cell_change"],
+                row["cell_change_ci95"],
+                row["limit"],
+            ),
+        )
+        for row in _rows(table)
+        if math.isfinite(row["limit"])
+    ]
 
 
 def _said_of_cost(cells: pd.DataFrame) -> _Said:

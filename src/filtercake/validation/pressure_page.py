@@ -15,20 +15,24 @@ from filtercake.packing.result import publish
 from filtercake.validation import pages
 from filtercake.validation.figures import pressure as figures
 from filtercake.validation.pressure import cases, compute
-from filtercake.validation.pressure_evidence import averages, friction_series, read_cells
+from filtercake.validation.pressure_evidence import averages, columns, friction_series, led, read_cells
 
 CELLS, MEANS = "pressure_cells.csv", "pressure.csv"
 PAGE, LOAD_IMAGE, FRICTION_IMAGE = "pressure.md", "pressure_load.png", "pressure_friction.png"
+COLUMN_IMAGE = "pressure_column.png"
 
 
 def write(table: pd.DataFrame, template: Path, docs: Path, pdf: Path) -> None:
     """Write tables, figures and page into the folder of the documentation, and the figures as PDF into another."""
     _publish(table, docs / "data" / CELLS)
-    means = averages(read_cells(docs / "data" / CELLS))
+    cells = read_cells(docs / "data" / CELLS)
+    means = averages(cells)
     _publish(means, docs / "data" / MEANS)
     with applied():
-        save(figures.draw_load(means), docs / "images" / LOAD_IMAGE, pdf / "load.pdf")
+        save(figures.draw_load(led(cells)), docs / "images" / LOAD_IMAGE, pdf / "load.pdf")
         save(figures.draw_friction(friction_series(means)), docs / "images" / FRICTION_IMAGE, pdf / "friction.pdf")
+        if not (found := columns(cells)).empty:
+            save(figures.draw_columns(found), docs / "images" / COLUMN_IMAGE, pdf / "column.pdf")
     with publish(docs / PAGE) as temporary:
         temporary.write_text(render(template, docs), encoding="utf-8")
 
