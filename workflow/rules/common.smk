@@ -16,6 +16,7 @@ from filtercake.run import console, slurm
 from filtercake.run.job import FOLDER_VARIABLE, PROGRESS_VARIABLE, Progress
 from filtercake.run.provenance import code_hash, packing_code, sources
 from filtercake.study import engine_choice, estimate
+from filtercake.study.cross_check import drawn as drawn_for_cross_check
 from filtercake.study.loading import (
     find_studies,
     load_studies,
@@ -56,7 +57,7 @@ try:
     )
     settings = load_workflow(named, CONFIG_FILE)
     STUDIES = {
-        study.name: study
+        study.name: engine_choice.of_this_machine(study)
         for study in load_studies(find_studies(settings, STUDY_FILES, CONFIG_FILE))
     }
     POINTS = points_by_name(STUDIES)
@@ -106,8 +107,32 @@ def packings_of(study):
     return packed(KNOWN_POINTS[study].values())
 
 
+def cross_checked(study):
+    """Points of a study with what another engine makes of them."""
+    return drawn_for_cross_check(KNOWN[study], KNOWN_POINTS[study].values())
+
+
+@cache
+def everything_packed(study):
+    """What is packed for a study, and for its cross-check, by name."""
+    others = {other.name: other for _, other in cross_checked(study)}
+    return {**packings_of(study), **others}
+
+
 def packed_of(wildcards):
-    return packings_of(wildcards.study)[wildcards.point]
+    return everything_packed(wildcards.study)[wildcards.point]
+
+
+def cross_check_manifests(wildcards):
+    folder = f"{RESULTS}/{wildcards.study}/packings"
+    pairs = cross_checked(wildcards.study)
+    return [f"{folder}/{point.name}/{MANIFEST}" for pair in pairs for point in pair]
+
+
+def cross_check_tables(wildcards):
+    """The cross-check's table, where the study has one."""
+    has_one = study_of(wildcards).model.cross_check is not None
+    return [f"{RESULTS}/{wildcards.study}/tables/cross_check.csv"] if has_one else []
 
 
 def manifests(wildcards):

@@ -127,9 +127,39 @@ rule filter_design:
         "../scripts/filter.py"
 
 
+rule cross_check:
+    input:
+        manifests=cross_check_manifests,
+        csds=csd_tables,
+    output:
+        "{results}/{study}/tables/cross_check.csv",
+    log:
+        "{results}/{study}/logs/cross_check.log",
+    benchmark:
+        "{results}/{study}/benchmarks/cross_check.tsv"
+    localrule: True
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        library=library("results.cross_check"),
+        pairs=lambda wildcards: [
+            [point.as_dict() for point in pair]
+            for pair in cross_checked(wildcards.study)
+        ],
+        sphericity=lambda wildcards: study_of(wildcards).model.material.sphericity,
+    message:
+        "the same clouds by two engines, of {wildcards.study}"
+    script:
+        "../scripts/cross_check.py"
+
+
 rule provenance:
     input:
         filter_tables,
+        cross_check_tables,
         crystallizer_tables,
         "{results}/{study}/points.csv",
         "{results}/{study}/tables/table1.csv",

@@ -135,7 +135,7 @@ def _study_file(study: str) -> Path:
 
 
 def _find(study: LoadedStudy, name: str) -> Point:
-    points = {point.name: point for point in expand(study, engine_choice.choose)}
+    points = {point.name: point for point in expand(engine_choice.of_this_machine(study), engine_choice.choose)}
     if name not in points:
         allowed = f"no such point of the study {study.name} on this machine; points: {', '.join(points)}"
         raise ConfigError([Problem(ORIGIN, "point", repr(name), allowed)])

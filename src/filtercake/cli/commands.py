@@ -664,7 +664,7 @@ def _run_estimate(options: argparse.Namespace) -> int:
     asked = options.cores
     if not (asked.isascii() and asked.isdigit() and len(asked) < 10 and int(asked) > 0):
         raise words.UsageError(f"--cores = {asked}: must be a whole number, from 1")
-    study = load_study(Path(options.study))
+    study = engine_choice.of_this_machine(load_study(Path(options.study)))
     points = packed(expand(study, engine_choice.choose)).values()
     found = estimate(points, on_cluster=options.cluster)
     wall = found.wall_seconds(int(asked))

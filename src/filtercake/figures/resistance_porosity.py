@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from matplotlib.lines import Line2D
 from filtercake.figures import selection, style
 from filtercake.figures.selection import StudyData
 from filtercake.filtration.resistance import law_of, resistance
+from filtercake.packing.engines import label_of
 from filtercake.study.config.published import Published
 from filtercake.study.points import base_rows
 
@@ -42,11 +44,12 @@ def draw(data: StudyData) -> Figure:
     axes.set_ylim(0.0, 1.02 * max(highest))
     for _, row in rows.iterrows():
         _ours(axes, data, row)
+    others = [key for engine, own in _others(data) for key in _other(axes, data, engine, own)]
     published = [key for name in names for key in _published(axes, data, name)]
     style.resistance_axis(axes, np.array(highest))
     axes.set_xlabel(style.POROSITY)
     ours = style.key("this work, 95 % interval", color=style.FAINT, marker="o", linewidth=0.0)
-    style.legend(figure, [axes], extra=[ours, *published] if rows["porosity"].notna().any() else published)
+    style.legend(figure, [axes], extra=[ours, *others, *published] if rows["porosity"].notna().any() else published)
     notes = [f"curves: {selection.law_title(data.study.resistance_law)} with the full distribution"]
     if any(line.get_gid() == "published" and np.min(line.get_ydata()) == 0.0 for line in axes.get_lines()):
         notes.append("markers on the abscissa: no resistance published")
@@ -100,6 +103,31 @@ def _ours(axes: Axes, data: StudyData, row: pd.Series[Any]) -> None:
         elinewidth=0.9,
         zorder=4,
     )
+
+
+def _others(data: StudyData) -> Iterable[tuple[str, pd.DataFrame]]:
+    """List the base points by each engine beside the study's own, those with an accepted packing."""
+    rows = selection.other_engines(data)
+    for engine, own in rows[rows["porosity"].notna()].groupby("engine", sort=False):
+        yield label_of(str(engine)), own
+
+
+def _other(axes: Axes, data: StudyData, engine: str, rows: pd.DataFrame) -> list[Line2D]:
+    """Plot the means by another engine, hollow; return their legend entry."""
+    hollow: dict[str, Any] = {"marker": "s", "markersize": 6.5, "markerfacecolor": "none", "linewidth": 0.0}
+    for _, row in rows.iterrows():
+        axes.errorbar(
+            [float(row["porosity"])],
+            [float(row["resistance_m_kg"])],
+            xerr=[float(row["porosity_ci95"])],
+            color=_ink(data, str(row["csd"])),
+            capsize=3.0,
+            elinewidth=0.7,
+            zorder=3.5,
+            gid="other_engine",
+            **hollow,
+        )
+    return [style.key(f"this work by {engine}, 95 % interval", markeredgecolor=style.FAINT, **hollow)]
 
 
 def _published(axes: Axes, data: StudyData, csd: str) -> list[Line2D]:

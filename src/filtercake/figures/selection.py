@@ -111,6 +111,12 @@ def base_points(data: StudyData, protocol: str = "") -> pd.DataFrame:
     return rows.sort_values("csd", key=lambda names: names.map(lambda csd: number(data, csd)), kind="stable")
 
 
+def other_engines(data: StudyData) -> pd.DataFrame:
+    """Summary rows at the base material by engines that are not the study's own, in its own protocol."""
+    rows = base_rows(data.study, data.summary, ("engine",))
+    return rows[~rows["point"].isin(base_points(data)["point"])]
+
+
 def main_point(data: StudyData) -> pd.Series[Any] | None:
     """Find the base point of the distribution with the most points; None where no sweep visits the base material."""
     rows = base_points(data)

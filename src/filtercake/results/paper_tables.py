@@ -156,12 +156,11 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
     (the answer), and the measurement. Resistances are of the full distribution: by the study's law, with its own
     interval, by the laws ``additive`` and ``carman`` beside it, and that of the paper's count by eq. 3 as in the paper.
     """
-    rows = []
-    for name, (full, _) in csds.items():
-        base = base_rows(study, summary[summary["csd"] == name])
-        if base.empty:
-            continue
-        point, material = base.iloc[0], study.material
+    rows, material = [], study.material
+    every = [_by_engine(study, summary[summary["csd"] == name]) for name in csds]
+    for _, point in pd.concat(every).iterrows() if every else ():
+        name = str(point["csd"])
+        full, _ = csds[name]
         paper_count = float(point["porosity_paper_count"])
         rows.append(
             {
@@ -190,6 +189,12 @@ def table4(study: Study, csds: Csds, summary: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def _by_engine(study: Study, rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the base points of a distribution, one by each engine that packed it, the study's own first."""
+    every = pd.concat([base_rows(study, rows), base_rows(study, rows, ("engine",))])
+    return every.drop_duplicates("engine")
 
 
 def _measured_resistance(published: Published | None) -> dict[str, float]:
@@ -224,16 +229,14 @@ def comparison(study: Study, replicates: pd.DataFrame) -> pd.DataFrame:
         here &= np.isclose(replicates["friction"], entry.friction)
         for name in ("poisson_ratio", "restitution", "youngs_modulus_MPa"):
             here &= np.isclose(replicates[name], getattr(study.material, name))
-        values = replicates.loc[here, "porosity_paper_count"].to_numpy(np.float64)
-        if not values.size:
-            continue
-        engine = str(replicates.loc[here, "engine"].iloc[0])
-        mean, sd = float(values.mean()), float(pooled.get(engine, np.nan))
-        rows.append(
-            (
-                *(entry.csd, entry.cohesion_kJ_m3, entry.friction, engine),
-                *(entry.source, entry.value, values.size, mean, sd, (entry.value - mean) / sd),
-                float(replicates.loc[here, "porosity"].mean()),
+        for engine, own in replicates[here].groupby("engine", sort=False):
+            values = own["porosity_paper_count"].to_numpy(np.float64)
+            mean, sd = float(values.mean()), float(pooled.get(str(engine), np.nan))
+            rows.append(
+                (
+                    *(entry.csd, entry.cohesion_kJ_m3, entry.friction, engine),
+                    *(entry.source, entry.value, values.size, mean, sd, (entry.value - mean) / sd),
+                    float(own["porosity"].mean()),
+                )
             )
-        )
     return pd.DataFrame(rows, columns=list(COMPARISON_COLUMNS))

@@ -74,6 +74,8 @@ def success(results: Path, points: Points) -> str:
             lines.append(f"{len(failed)} packings failed ({where}make retry):")
         lines += [f"  {point} r{replicate}: {reason}" for point, replicate, reason in failed[:SHOWN]]
         lines += [f"{study}: {line}" for line in _wide_intervals(folder / "summary.csv")]
+        checked = folder / "tables" / "cross_check.csv"
+        lines += [f"{study}: {agreement(read_table(checked)).words}"] if checked.exists() else []
     return "\n".join(lines)
 
 

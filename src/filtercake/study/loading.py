@@ -15,6 +15,7 @@ from filtercake.crystals.size_laws import made
 from filtercake.errors import ConfigError, CrystallizerError, CsdError, Problem, did_you_mean, shown
 from filtercake.filtration.resistance import RESISTANCE_LAWS, law_of
 from filtercake.packing.cloud import bed_for, cell_for
+from filtercake.packing.engines import kind_of
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene
 from filtercake.study import limits
@@ -198,6 +199,7 @@ def check_study(values: Any, path: Path, *, packed: bool = True) -> LoadedStudy:
         raise ConfigError(problems)
     problems = [*_reference_problems(model, str(path)), *slurry_problems(model, str(path))]
     problems += _law_problems(model, str(path))
+    problems += _engine_problems(model, str(path))
     of_protocols = dict.fromkeys(_protocol_problems(model, str(path)))
     problems += of_protocols
     if of_protocols:  # a scene needs a pressure
@@ -274,6 +276,7 @@ def _size_problems(model: Study, file: str) -> Iterable[Problem]:
     points = sum(
         len(sweep.csd or [])
         * len(sweep.protocol or [0])
+        * len(sweep.engine or [0])
         * math.prod(len(getattr(sweep, name) or [0]) for name in SWEPT)
         for sweep in model.sweeps
     )
@@ -313,6 +316,19 @@ def _law_problems(model: Study, file: str) -> Iterable[Problem]:
             "permeability (permeability: {packings: 2})"
         )
         yield Problem(file, "resistance_law", repr(model.resistance_law), allowed)
+
+
+def _engine_problems(model: Study, file: str) -> Iterable[Problem]:
+    """Engines of blocks that these do not suit."""
+    for index, sweep in enumerate(model.sweeps):
+        pressed = FILTRATION_PROTOCOL in (sweep.protocol or [model.packing.protocol])
+        for place, name in enumerate(sweep.engine or []):
+            key = f"sweeps[{index}].engine[{place}]"
+            if pressed and name not in (AUTO, Embedded.name):
+                allowed = "cakes are pressed by the embedded engine; give beds (protocol: gravity) a block of their own"
+                yield Problem(file, key, repr(name), allowed)
+            if kind_of(name).own_spheres and model.packing.bed_depth_factor not in (None, 1.0):
+                yield Problem(file, key, repr(name), "it has the paper's own box: packing.bed_depth_factor must be 1")
 
 
 def _protocol_problems(model: Study, file: str) -> Iterable[Problem]:
@@ -365,10 +381,11 @@ def _scenes(model: Study, csds: dict[str, LoadedCsd]) -> Iterable[tuple[str, dic
         axes = [_values(model, index, name) for name in SWEPT]
         known = [name for name in sweep.csd or [] if name in csds]
         protocols = sweep.protocol or [model.packing.protocol]
-        for name, protocol, places in itertools.product(known, protocols, itertools.product(*axes)):
+        kinds = itertools.product(known, protocols, sweep.engine or [model.packing.engine])
+        for (name, protocol, engine), places in itertools.product(kinds, itertools.product(*axes)):
             where = dict(zip(SWEPT, places, strict=True))
             swept = {axis: value for axis, (_, value) in where.items()}
-            scene = scene_of(model, csds[name].truncated, swept, protocol)
+            scene = scene_of(model, csds[name].truncated, swept, protocol, engine)
             keys = {
                 "cohesion": where["cohesion_kJ_m3"],
                 "adhesion": where["adhesion_mJ_m2"],

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene, digest
 from filtercake.study.config.packing import AUTO
 from filtercake.study.config.study import Study
@@ -20,6 +21,7 @@ from filtercake.units import KILOJOULE_PER_M3, KILOPASCAL, MEGAPASCAL, MILLIJOUL
 
 if TYPE_CHECKING:
     import pandas as pd
+from numpy.typing import NDArray
 
 ChooseEngine = Callable[[Scene], str]
 """Names an engine for a scene."""
@@ -128,9 +130,11 @@ def expand(study: LoadedStudy, choose_engine: ChooseEngine) -> list[Point]:
         axes = [_axis(study.model, sweep, name) for name in SWEPT]
         replicates = sweep.replicates or study.model.packing.replicates
         protocols = sweep.protocol or [study.model.packing.protocol]
-        for csd, protocol, values in itertools.product(sweep.csd or [], protocols, itertools.product(*axes)):
+        engines = sweep.engine or [study.model.packing.engine]
+        kinds = itertools.product(sweep.csd or [], protocols, engines)
+        for (csd, protocol, engine), values in itertools.product(kinds, itertools.product(*axes)):
             swept = dict(zip(SWEPT, values, strict=True))
-            point = _point(study, csd, swept, replicates, choose_engine, protocol)
+            point = _point(study, csd, swept, replicates, choose_engine, protocol, engine)
             known = points.get(point.name)
             if known is None or known.replicates < replicates:
                 points[point.name] = point
@@ -157,7 +161,8 @@ def base_point(
     """Return the point of a distribution at the study's base material, but for the properties named by ``changed``."""
     base = {name: study.model.base(name) for name in SWEPT}
     settings = study.model.packing
-    return _point(study, csd, {**base, **changed}, settings.replicates, choose_engine, settings.protocol)
+    swept = {**base, **changed}
+    return _point(study, csd, swept, settings.replicates, choose_engine, settings.protocol, settings.engine)
 
 
 def points_table(points: Iterable[Point]) -> pd.DataFrame:
@@ -171,9 +176,11 @@ def points_table(points: Iterable[Point]) -> pd.DataFrame:
 def base_rows(study: Study, table: pd.DataFrame, free: Collection[str] = ()) -> pd.DataFrame:
     """Rows of a table of points at the study's base, but for the properties named by ``free``.
 
-    They are those of the study's own protocol, unless ``free`` names ``protocol``.
+    They are those of the study's own protocol and engine, unless ``free`` names ``protocol`` or ``engine``.
     """
     keep = np.ones(len(table), dtype=bool)
+    if "engine" not in free:
+        keep &= _of_own_engine(study, table)
     if "protocol" not in free:
         keep &= (table["protocol"] == study.packing.protocol).to_numpy()
     pressed = (table["protocol"] == FILTRATION_PROTOCOL).to_numpy()
@@ -188,6 +195,16 @@ def base_rows(study: Study, table: pd.DataFrame, free: Collection[str] = ()) -> 
     return table[keep]
 
 
+def _of_own_engine(study: Study, table: pd.DataFrame) -> NDArray[np.bool_]:
+    """Rows by the study's own engine; by the first of the table, where its own packed nothing. One presses cakes."""
+    made = table["engine"].astype(str)
+    own = Embedded.name if study.packing.engine == AUTO else study.packing.engine
+    if len(table) and own not in set(made):
+        own = made.iloc[0]
+    pressed = table["protocol"] == FILTRATION_PROTOCOL
+    return np.asarray((made == own) | pressed, dtype=bool)
+
+
 def _axis(study: Study, sweep: Sweep, name: str) -> list[float | None]:
     values = getattr(sweep, name)
     return [study.base(name)] if values is None else list(values)
@@ -200,13 +217,16 @@ def _point(
     replicates: int,
     choose_engine: ChooseEngine,
     protocol: str,
+    engine: str,
 ) -> Point:
     settings = study.model.packing
-    scene = scene_of(study.model, study.csds[csd_name].truncated, swept, protocol)
+    scene = scene_of(study.model, study.csds[csd_name].truncated, swept, protocol, engine)
+    chosen = settings.engine if settings.engine != AUTO else choose_engine(scene)
     if scene.engine == AUTO:
-        scene = replace(scene, engine=choose_engine(scene))
+        scene = replace(scene, engine=chosen)
+    other = "" if scene.is_pressed or scene.engine == chosen else scene.engine
     return Point(
-        name=_slug(csd_name, swept, study.model, scene),
+        name=_slug(csd_name, swept, study.model, scene, other),
         study=study.name,
         csd=csd_name,
         residence_time_min=study.model.csds[csd_name].residence_time_min,
@@ -217,8 +237,11 @@ def _point(
     )
 
 
-def _slug(csd_name: str, swept: Mapping[str, float | None], study: Study, scene: Scene) -> str:
-    """Readable prefix and a hash of all that decides the result (not of time limits or labels)."""
+def _slug(csd_name: str, swept: Mapping[str, float | None], study: Study, scene: Scene, engine: str) -> str:
+    """Readable prefix and a hash of all that decides the result (not of time limits or labels).
+
+    ``engine`` is named where it is not the study's own.
+    """
     stick = f"s{swept['cohesion_kJ_m3']:g}"
     if scene.is_pressed and swept["adhesion_mJ_m2"] is not None:
         stick = f"W{swept['adhesion_mJ_m2']:g}"
@@ -228,6 +251,7 @@ def _slug(csd_name: str, swept: Mapping[str, float | None], study: Study, scene:
     for name, short in (("poisson_ratio", "nu"), ("restitution", "e"), ("youngs_modulus_MPa", "E")):
         if swept[name] != study.base(name):
             parts.append(f"{short}{swept[name]:g}")
+    parts += [engine] if engine else []
     return _safe("_".join([*parts, digest(scene.decisive())[:8]]))
 
 

@@ -37,7 +37,11 @@ def bed_of(settings: Packing, csd: CrystalSizeDistribution, protocol: str = GRAV
 
 
 def scene_of(
-    study: Study, csd: CrystalSizeDistribution, swept: Mapping[str, float | None], protocol: str = GRAVITY_PROTOCOL
+    study: Study,
+    csd: CrystalSizeDistribution,
+    swept: Mapping[str, float | None],
+    protocol: str = GRAVITY_PROTOCOL,
+    engine: str | None = None,
 ) -> Scene:
     """Build the scene of one point, with the engine as the study names it.
 
@@ -51,8 +55,11 @@ def scene_of(
         Values of ``SWEPT``, in the units their names say; None where there is none.
     protocol : {"gravity", "filtration"}
         How the packing is made.
+    engine : str, optional
+        Engine of beds; the study's if left out.
     """
-    settings, pressed = study.packing, protocol == FILTRATION_PROTOCOL
+    pressed = protocol == FILTRATION_PROTOCOL
+    settings = study.packing if engine is None else study.packing.model_copy(update={"engine": engine})
     bed = bed_of(settings, csd, protocol)
     value = {name: number or 0.0 for name, number in swept.items()}
     sticks_by_adhesion = pressed and swept["adhesion_mJ_m2"] is not None

@@ -9,8 +9,8 @@ from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
 
 ENGINES: dict[str, type[Engine]] = {
-    Liggghts.name: Liggghts,
     Embedded.name: Embedded,
+    Liggghts.name: Liggghts,
     LiggghtsAsPublished.name: LiggghtsAsPublished,
 }
 """In the order in which ``engine: auto`` prefers them."""

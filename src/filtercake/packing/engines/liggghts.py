@@ -27,8 +27,6 @@ EXECUTABLES = ("liggghts", "lmp_auto", "lmp_liggghts")
 TEMPLATE_FOLDER_VARIABLE = "FILTERCAKE_TEMPLATES"
 PROGRESS_SECONDS = 20.0
 LOOK_SECONDS = 5.0
-SMALL_BED = 10_000
-"""Spheres up to which LIGGGHTS is fast enough whatever the width of the distribution."""
 
 _BLOWN_UP = ("Lost atoms", "Non-numeric", "out of range", "Out of range", "neighbor list", "Bond atoms missing")
 """Words of LIGGGHTS's errors about spheres that fly apart, not about its input."""
@@ -78,12 +76,6 @@ class Liggghts(Engine):
         """
         self.force_tangential = force_tangential
         self.units = units
-
-    @classmethod
-    def suits(cls, scene: Scene) -> bool:
-        """Whether ``engine: auto`` may take it: where the bed is small or narrow, and the restitution not too low."""
-        fast = scene.particles <= SMALL_BED or not scene.is_wide
-        return fast and scene.restitution > cls.least_restitution
 
     def why_missing(self) -> str | None:
         """Say why LIGGGHTS cannot run here, None where it can."""

@@ -7,7 +7,6 @@ from typing import Any
 from filtercake.packing.engines import micro
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.engines.liggghts import Liggghts, material_values
-from filtercake.packing.scene import Scene
 
 ROUNDS = 150
 SMALLEST_SEED = 10_000
@@ -24,11 +23,6 @@ class LiggghtsAsPublished(Liggghts):
     wide_factor = 1.0
     own_spheres = True
     fixed_steps = 150_000  # paper, Table 3
-
-    @classmethod
-    def suits(cls, scene: Scene) -> bool:  # noqa: ARG003
-        """Whether ``engine: auto`` may take it: never, it is there to be compared with."""
-        return False
 
     def _deck_values(self, request: SettleRequest) -> dict[str, Any]:
         scene, csd = request.scene, request.scene.csd

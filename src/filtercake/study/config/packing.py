@@ -87,7 +87,10 @@ class Packing(Model):
     max_replicates: Annotated[int, Field(ge=2, le=1000), TO_WHOLE] = Field(
         default=64, description="Packings per point after which porosity_ci95_target gives up, and says so."
     )
-    engine: EngineName = Field(default=AUTO, description="auto takes the best engine on this machine; or name one.")
+    engine: EngineName = Field(
+        default=AUTO,
+        description="auto takes the fastest engine that agrees with the others, the embedded one; or name one.",
+    )
     seed: Annotated[int, Field(ge=0, le=LARGEST_INTEGER), TO_WHOLE] = Field(
         default=1, description="Base seed of all random numbers."
     )

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from filtercake.filtration.resistance import ADDITIVE
+from filtercake.study.config.cross_check import CrossCheck
 from filtercake.study.config.crystals import Crystallizer, Csd
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
@@ -43,6 +44,9 @@ class Study(Model):
     packing: Packing = Field(default=Packing(), description="How the packings are made.")
     sweeps: Annotated[list[Sweep], Field(min_length=1, max_length=MOST_VALUES)] = Field(
         description="Blocks of points; their union is visited."
+    )
+    cross_check: CrossCheck | None = Field(
+        default=None, description="Packings made once more by another engine, and how the porosities differ."
     )
     published: Annotated[list[Published], Field(max_length=MOST_VALUES)] = Field(
         default=[], description="Published values to show beside ours."

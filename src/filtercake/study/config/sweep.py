@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from filtercake.study.config.packing import EngineName
 from filtercake.study.config.values import (
     ENTRIES,
     LISTED,
@@ -63,6 +64,11 @@ class Sweep(Model):
     )
     protocol: Annotated[list[Protocol], LISTED, ENTRIES] | None = Field(
         default=None, description="Protocols of this block, instead of packing.protocol."
+    )
+    engine: Annotated[list[EngineName], LISTED, ENTRIES] | None = Field(
+        default=None,
+        description="Engines that pack this block, each its own points, instead of packing.engine; one that is not "
+        "installed is left out, and said.",
     )
     replicates: Annotated[int, Field(ge=1, le=1000), TO_WHOLE] | None = Field(
         default=None, description="Packings per point of this block, instead of packing.replicates."
