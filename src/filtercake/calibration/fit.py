@@ -206,7 +206,7 @@ def calibrate(
     An interval is the wider of two: by the errors, and by the spread of the distributions about the best parameters
     (Student, with the degrees of freedom that the fit leaves them). The second covers whatever stands between the
     distributions, also where they agree by chance (G. Knapp & J. Hartung, Stat. Med. 22 (2003) 2693); a single
-    distribution leaves only the first.
+    distribution leaves only the first, at however many pressures, unless these contradict the packings' course.
 
     Parameters
     ----------
@@ -238,7 +238,10 @@ def calibrate(
     chi_square, discrepancy = _misfit(residual, chosen, freedom)
     deviance = _deviance(residual, chosen, discrepancy).reshape(shape)
     deviance -= deviance.min()
-    scale, scale_freedom = _scale(chosen, chi_square, freedom)
+    between = max(len({item.csd for item in observations}) - len(parameters), 0)
+    if not between and improbable(chi_square, freedom):
+        between = freedom
+    scale, scale_freedom = _scale(chosen, min(chi_square / freedom, 1.0) if freedom else 0.0, between)
     estimates = tuple(
         _profile(parameter, axis, deviance, number, scale * likelihood_limit(scale_freedom))
         for number, (parameter, axis) in enumerate(zip(parameters, axes, strict=True))
@@ -352,17 +355,17 @@ def _misfit(residual: FloatArray, groups: _Groups, freedom: int) -> tuple[float,
     return chi_square, float(scipy.optimize.brentq(lambda d: least(d) - freedom, 0.0, 1.01 * widest + 1e-9))
 
 
-def _scale(groups: _Groups, chi_square: float, freedom: int) -> tuple[float, float]:
+def _scale(groups: _Groups, mean_square: float, freedom: int) -> tuple[float, float]:
     """Scale of the squares and its degrees of freedom, by which the interval is the widest.
 
     By the errors it is 1: known, or resting on the scatter of measurements that contradict each other. A cake's part in
     the variance of a weighted mean is its weight, the inverse of its variance: one whose measurements scatter counts
-    for little beside others that are sharp. By the cakes it is their mean square about the best parameters, 1 with a
-    discrepancy.
+    for little beside others that are sharp. By the distributions it is the mean square about the best parameters (at
+    most 1, and 1 with a discrepancy), with the degrees of freedom that those leave.
     """
     scales = [(1.0, effective_freedom(1.0 / groups.measured, groups.freedom))]
     if freedom:
-        scales.append((min(chi_square / freedom, 1.0), float(freedom)))
+        scales.append((mean_square, float(freedom)))
     return max(scales, key=lambda found: found[0] * likelihood_limit(found[1]))
 
 

@@ -320,7 +320,7 @@ class TestContradictions:
         groups = _Groups(("doubtful", "sharp"), errors, freedom, np.zeros((2, 1)), np.eye(2), np.eye(2))
         assert _scale(groups, 0.0, 1) == (1.0, pytest.approx((1.0 + 100.0) ** 2))
         assert _scale(groups, 0.5, 1) == (0.5, 1.0)
-        assert _scale(groups, 9.0, 1) == (1.0, 1.0)
+        assert _scale(groups, 1.0, 1) == (1.0, 1.0)
 
     def test_within_the_errors_are_none(self) -> None:
         assert "contradiction" not in kinds(self.fit(50.0, 51.0))

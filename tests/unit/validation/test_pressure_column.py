@@ -12,6 +12,7 @@ import pytest
 
 from filtercake.errors import EngineError, EngineMissing
 from filtercake.packing import contact_law
+from filtercake.packing.cell import FRICTIONAL_STEP, FRICTIONLESS_STEP
 from filtercake.packing.cloud import make_cloud
 from filtercake.packing.engines.base import SettleRequest
 from filtercake.packing.result import SettledState
@@ -42,7 +43,8 @@ SOFT = 5e-3
 
 def column_of(sizes: dict[float, float], particles: int, friction: float = 0.0, **options: Any) -> Column:
     scene = pressure.bed({"mixture": sizes}, friction=friction, particles=particles, **options)
-    return Column(replace(scene, engine="liggghts").with_time_step(0.5)).without_impact()
+    share = FRICTIONAL_STEP if friction else FRICTIONLESS_STEP
+    return Column(replace(scene, engine="liggghts").with_time_step(share)).without_impact()
 
 
 def lattice(**changed: Any) -> tuple[Column, SettledState]:
