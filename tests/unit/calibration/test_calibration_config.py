@@ -185,7 +185,8 @@ def test_a_wide_range_is_doubted_and_one_too_wide_refused(tmp_path: Path) -> Non
 def test_unknown_calibrations_are_listed(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as error:
         load_calibrations(["pmmma", "pmma"], ROOT / "config/calibrations", STUDIES, "config/config.yaml")
-    assert "calibrations[0] = 'pmmma': no such calibration; allowed: pmma, pmma_filtration, pmma_paper, synthetic" in str(error.value)
+    known = "pmma, pmma_filtration, pmma_paper, synthetic"
+    assert f"calibrations[0] = 'pmmma': no such calibration; allowed: {known}" in str(error.value)
 
 
 def test_calibrations_of_one_name_are_refused(tmp_path: Path) -> None:
