@@ -17,6 +17,7 @@ from filtercake.calibration.measurements import ConstantPressureTest, KnownResis
 from filtercake.cli.fields import allowed, meaning
 from filtercake.filtration.resistance import CARMAN
 from filtercake.packing.scene import FILTRATION_PROTOCOL
+from filtercake.study.config.cross_check import CrossCheck
 from filtercake.study.config.crystals import Crystallizer, Csd, Lognormal, RosinRammler, SizeClass
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
@@ -137,6 +138,7 @@ def reference() -> str:
         ("`packing`", Packing),
         ("`permeability`", Permeability),
         ("`sweeps[]`", Sweep),
+        ("`cross_check`", CrossCheck),
         ("`published[]`", Published),
         ("A calibration: `config/calibrations/<name>.yaml`", Calibration),
         ("`cohesion_kJ_m3` of a calibration", CohesionRange),
@@ -196,6 +198,7 @@ def _example(key: str) -> str:
     examples = {
         "residence_time_min": "[15, 30, 45, 60] # instead of csd",
         "cohesion_kJ_m3": "[0, 25, 50]",
+        "engine": "[embedded, liggghts]",
         "friction": "[0, 0.05]",
         "poisson_ratio": "[0.2, 0.3]",
         "restitution": "[0.3, 0.6]",

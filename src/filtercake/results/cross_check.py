@@ -95,5 +95,5 @@ def agreement(table: pd.DataFrame) -> Agreement:
     """Average the differences of :func:`cross_check_table`."""
     found = table["difference"].dropna().to_numpy(np.float64)
     mean = float(found.mean()) if found.size else np.nan
-    engines = (str(table[name].dropna().iloc[0]) for name in ("engine", "other_engine"))
-    return Agreement(*engines, int(found.size), mean, half_width(found))
+    own, other = (str(table[name].dropna().iloc[0]) for name in ("engine", "other_engine"))
+    return Agreement(own, other, int(found.size), mean, half_width(found))
