@@ -63,7 +63,7 @@ def test_the_configuration_takes_it(
 ) -> None:
     assert toy_scene.engine == "toy"
     monkeypatch.delitem(ENGINES, Toy.name)
-    with pytest.raises(ConfigError, match=r"packing\.engine = 'toy': allowed: 'auto', 'liggghts', 'embedded'"):
+    with pytest.raises(ConfigError, match=r"packing\.engine = 'toy': allowed: 'auto', 'embedded', 'liggghts'"):
         study_from(good_study + SCENE)
     assert Packing.model_json_schema()["properties"]["engine"]["enum"] == [AUTO, *ENGINES]
 

@@ -338,7 +338,7 @@ def test_a_wrong_value_is_named(
             "below the Rayleigh time step 0.8223 us (docs/stability.md)",
         ),
         ("replicates: 0", "replicates", "0", "must be greater than or equal to 1"),
-        ("engine: lammps", "engine", "'lammps'", "allowed: 'auto', 'liggghts'"),
+        ("engine: lammps", "engine", "'lammps'", "allowed: 'auto', 'embedded'"),
         ("seed: -1", "seed", "-1", "must be greater than or equal to 0"),
         ("write_vtk: perhaps", "write_vtk", "'perhaps'", "must be a valid boolean"),
         ("max_fall_times: .inf", "max_fall_times", "inf", "must be"),
@@ -751,18 +751,14 @@ def test_auto_needs_nothing_installed(
     assert engine_choice.choose(make_scene(csd=alum(15)[1].csd, particles=100_000)) == "embedded"
 
 
-def test_auto_takes_liggghts_where_it_is_installed_and_suits(
-    nowhere: Path, alum: Any, make_scene: Callable[..., Scene]
+def test_auto_takes_the_embedded_engine_also_where_liggghts_is_installed(
+    nowhere: Path, make_scene: Callable[..., Scene]
 ) -> None:
     program = nowhere / "liggghts"
     program.write_text("#!/bin/sh\n", encoding="utf-8")
     program.chmod(0o755)
-    wide = alum(15)[1].csd
-    assert engine_choice.choose(make_scene(particles=2000)) == "liggghts"
-    assert engine_choice.choose(make_scene(particles=100_000)) == "liggghts"  # narrow
-    assert engine_choice.choose(make_scene(csd=wide, particles=2000)) == "liggghts"  # small
-    assert engine_choice.choose(make_scene(csd=wide, particles=100_000)) == "embedded"
-    assert engine_choice.choose(make_scene(particles=2000, restitution=0.05)) == "embedded"  # LIGGGHTS does not take it
+    assert engine_choice.choose(make_scene(particles=2000)) == "embedded"
+    assert engine_choice.choose(make_scene(particles=2000, restitution=0.05)) == "embedded"
 
 
 # --- a crystallizer ------------------------------------------------------------------------------------------------
@@ -858,8 +854,9 @@ def test_an_unusable_law_is_refused(
 @pytest.mark.parametrize("path", [*Path(__file__).parents[3].glob("config/[sb]*s/*.yaml")], ids=lambda path: path.stem)
 def test_studies_of_the_paper_say_that_theirs_is_eq_3(path: Path) -> None:
     # cakes that are pressed are ours, and so is their law
-    expected = "carman" if path.stem.endswith("_filtration") else "additive"
-    assert f"\nresistance_law: {expected}" in path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    expected = "carman" if "\n  protocol: filtration\n" in text else "additive"
+    assert f"\nresistance_law: {expected}" in text
 
 
 def test_residence_times_need_a_crystallizer(tmp_path: Path) -> None:
