@@ -91,7 +91,7 @@ check-workflow:
 
 # compiled once here, not by each process of tests
 kernels:
-	$(BIN)/python tests/compile_kernels.py
+	@$(BIN)/python -m filtercake.cli.warm_up
 
 format: setup ## format the code
 	$(BIN)/ruff check --fix .

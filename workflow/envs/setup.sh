@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Creates the Python environment from the lock file, and installs Debian's LIGGGHTS where it is missing and allowed.
+# Creates the Python environment from the lock file, compiles the kernels, and installs Debian's LIGGGHTS where it is
+# missing and allowed.
 # Called by make; does nothing that is done already. Usage: setup.sh VENV
 set -euo pipefail
 
@@ -60,6 +61,9 @@ if [ "$(cat "$venv/.made-from" 2>/dev/null || true)" != "$stamp" ]; then
     rm -rf "$venv"
     make_environment
     printf '%s\n' "$stamp" >"$venv/.made-from"
+    # beside the installation of LIGGGHTS; what fails here is compiled with the first packing
+    "$venv/bin/python" -m filtercake.cli.warm_up &
+    compiling=$!
 fi
 
 if ! command -v "${FILTERCAKE_LIGGGHTS:-liggghts}" >/dev/null; then
@@ -70,4 +74,8 @@ if ! command -v "${FILTERCAKE_LIGGGHTS:-liggghts}" >/dev/null; then
     else
         say "LIGGGHTS is not installed and cannot be installed here (needs root or sudo, and Debian): the embedded engine serves"
     fi
+fi
+
+if [ -n "${compiling:-}" ]; then
+    wait "$compiling" || say "the kernels were not compiled: the first packings do it"
 fi
