@@ -81,7 +81,7 @@ def test_captions_and_front_page_name_n_and_the_engine(reported: Path, finished:
 
 def test_the_front_page_shows_the_answers_above_the_words(reported: Path) -> None:
     front = embedded(reported, "workflow_desc")
-    assert re.findall(r'<img src="data:image/png;base64,[^"]+" alt="([^"]*)">', front) == ANSWERS
+    assert re.findall(r'<img src="data:image/png;base64,[^"]+" width="\d+" alt="([^"]*)">', front) == ANSWERS
     assert front.rindex("<img") < front.index("Asked:") < front.index("What was done")
     assert embedded(reported, "metadata")  # or it would open on the graph of jobs
 

@@ -45,7 +45,7 @@ async function front() {
         pictures: pictures().map((image) => ({ title: image.alt, width: image.clientWidth })),
         above: pictures().every((image) => image.getBoundingClientRect().bottom <= first.getBoundingClientRect().top),
         seen: pictures().length > 0 && pictures()[0].getBoundingClientRect().top >= 0 && pictures()[0].getBoundingClientRect().bottom <= innerHeight,
-        graph: Boolean(document.querySelector("#rulegraph")),
+        graph: Boolean(document.querySelector("div#rulegraph")),
     };
 }
 

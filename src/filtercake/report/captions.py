@@ -20,7 +20,7 @@ from filtercake.figures.style import FOOTER
 from filtercake.packing.result import publish
 from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL, PROTOCOLS
 from filtercake.report.pages import engine_names, environment
-from filtercake.report.pictures import on_screen
+from filtercake.report.pictures import Picture, on_screen
 from filtercake.report.words import heading, number, with_interval
 from filtercake.results.resistance_columns import LAW_CI95
 from filtercake.study.config.sweep import SWEPT
@@ -34,10 +34,10 @@ SUFFIX, FRONT = ".html.j2", "front"
 
 
 class Shown(NamedTuple):
-    """A figure on the front page: its title, and the picture itself as a data URI."""
+    """A figure on the front page: its title, and the picture itself."""
 
     title: str
-    uri: str
+    picture: Picture
 
 
 def write(templates: Path, figures: Iterable[Path], values: Mapping[str, Any], target: Path) -> None:

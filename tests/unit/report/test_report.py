@@ -128,7 +128,7 @@ def test_the_front_page_shows_the_figures_that_answer_above_the_words(made_up: S
         save(Figure(figsize=(3.5, 2.0)), tmp_path / f"{name}.png", tmp_path / f"{name}.pdf")
     captions.write(TEMPLATES, [tmp_path / f"{name}.png" for name in names], captions.study_values(made_up), tmp_path)
     front = (tmp_path / "front.html").read_text()
-    found = re.findall(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)">', front)
+    found = re.findall(r'<img src="data:image/png;base64,([^"]+)" width="394" alt="([^"]+)">', front)
     assert [title for _, title in found] == ["Resistance against cohesion (Fig. 10)", "Cut through a packing"]
     assert front.index("<h2>") < front.index("<img") < front.rindex("</figure>") < front.index("Asked:")
     for data, _ in found:
@@ -140,7 +140,7 @@ def test_a_picture_on_a_screen_is_what_was_printed(tmp_path: Path) -> None:
     figure, (axes,) = panels()
     axes.plot([0.0, 1.0], [0.0, 1.0], color="#0072B2")
     save(figure, tmp_path / "a.png", tmp_path / "a.pdf")
-    data = base64.b64decode(on_screen(tmp_path / "a.png").removeprefix("data:image/png;base64,"))
+    data = base64.b64decode(on_screen(tmp_path / "a.png").uri.removeprefix("data:image/png;base64,"))
     with Image.open(io.BytesIO(data)) as small, Image.open(tmp_path / "a.png") as whole:
         expected = np.asarray(whole.convert("RGB").resize(small.size, Image.Resampling.LANCZOS), dtype=float)
         assert np.abs(np.asarray(small.convert("RGB"), dtype=float) - expected).max() < 16.0
