@@ -109,7 +109,8 @@ figures: setup ## redraw the figures
 
 report: setup ## figures, tables, captions, method in one file: results/report.html (STUDIES=a,b REPORT=file.html)
 	$(SNAKEMAKE) report $(REPORTED)
-	$(SNAKEMAKE) report $(REPORTED) --report "$(REPORT)" --report-stylesheet workflow/report/report.css
+	$(SNAKEMAKE) report $(REPORTED) --report "$(REPORT)" --report-stylesheet workflow/report/report.css \
+		--report-metadata workflow/report/landing.yaml
 	@echo "report: $(REPORT)"
 
 benchmark: setup ## run time against error: docs/benchmark.md (about 30 min on 2 cores; QUICK=1: a few minutes, docs untouched)

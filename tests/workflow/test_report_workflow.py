@@ -13,11 +13,14 @@ from typing import Any
 import pytest
 from checkouts import TINY, Checkout
 
+from filtercake.figures.catalogue import title_of
 from filtercake.report.catalogue import PAGES
 
 WALK = Path(__file__).with_name("walk_report.js")
 NOWHERE = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
 """Makes every request fail: the report needs none."""
+ANSWERS = ["Resistance against cohesion (Fig. 10)", "Cut through a packing"]
+"""What the front page shows of the tiny study."""
 LOADED = re.compile(r"""<(?:script|img|iframe|link)\b[^>]*?\b(?:src|href)=["']?https?:|@import|url\(["']?https?:""")
 WRONG = re.compile("Uncaught|Error|Failed to load|net::|Refused")
 """Of the console's lines those that are errors; the rest are the hints of the libraries inside the report."""
@@ -25,7 +28,7 @@ WRONG = re.compile("Uncaught|Error|Failed to load|net::|Refused")
 
 @pytest.fixture(scope="module")
 def reported(finished: Checkout) -> Path:
-    style = ("--report-stylesheet", "workflow/report/report.css")
+    style = ("--report-stylesheet", "workflow/report/report.css", "--report-metadata", "workflow/report/landing.yaml")
     for steps in ((), ("--report", "results/report.html", *style)):
         done = finished.snakemake("report", "--config", f"studies={TINY}", *steps, **NOWHERE)
         assert done.returncode == 0, done.stderr + done.stdout
@@ -76,6 +79,20 @@ def test_captions_and_front_page_name_n_and_the_engine(reported: Path, finished:
         assert re.search("(?i)porosity|resistance", text) and re.search(r"0\.\d+ ± 0\.\d+|± [\d.]+\)·10", text)
 
 
+def test_the_front_page_shows_the_answers_above_the_words(reported: Path) -> None:
+    front = embedded(reported, "workflow_desc")
+    assert re.findall(r'<img src="data:image/png;base64,[^"]+" width="\d+" alt="([^"]*)">', front) == ANSWERS
+    assert front.rindex("<img") < front.index("Asked:") < front.index("What was done")
+    assert embedded(reported, "metadata")  # or it would open on the graph of jobs
+
+
+def test_the_menu_names_figures_as_readers_do(reported: Path) -> None:
+    figures = {path: found for path, found in embedded(reported, "results").items() if path.endswith(".png")}
+    assert figures
+    for path, found in figures.items():
+        assert found["labels"] == {"figure": title_of(Path(path).stem)}
+
+
 def test_the_method_page_shows_its_formulas(reported: Path) -> None:
     (page,) = (page_text(r) for path, r in embedded(reported, "results").items() if path.endswith("pages/method.html"))
     assert page.count("<math") > 5 and "What the model leaves out" in page and "$" not in page
@@ -105,7 +122,11 @@ def test_the_browser_opens_all_of_it_without_errors(reported: Path, tmp_path: Pa
     walked = json.loads(found[1])
     assert walked["errors"] == []
     assert walked["requests"] == [], walked["requests"]
-    assert walked["drawn"] == {"Workflow": True, "Statistics": True}
+    assert all(walked["drawn"].values()) and len(walked["drawn"]) == 4, walked["drawn"]
+    for front in (walked["front"], walked["again"]):
+        assert [picture["title"] for picture in front["pictures"]] == ANSWERS
+        assert all(picture["width"] > 200 for picture in front["pictures"])
+        assert front["above"] and front["seen"] and not front["graph"], front
     categories, results = embedded(reported, "categories"), embedded(reported, "results")
     opened = {name: {part: len(rows) for part, rows in parts.items()} for name, parts in walked["categories"].items()}
     listed = {name: {part: len(paths) for part, paths in parts.items()} for name, parts in categories.items()}

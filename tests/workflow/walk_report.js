@@ -35,6 +35,20 @@ async function caption(number) {
     return found ? found.innerText : "";
 }
 
+const pictures = () => [...document.querySelectorAll("nav + div .answers img")];
+
+// what stands on the screen before anything is pressed
+async function front() {
+    await until(() => pictures().length && pictures().every((image) => image.naturalWidth > 0));
+    const first = document.querySelector("nav + div .answers + p");
+    return {
+        pictures: pictures().map((image) => ({ title: image.alt, width: image.clientWidth })),
+        above: pictures().every((image) => image.getBoundingClientRect().bottom <= first.getBoundingClientRect().top),
+        seen: pictures().length > 0 && pictures()[0].getBoundingClientRect().top >= 0 && pictures()[0].getBoundingClientRect().bottom <= innerHeight,
+        graph: Boolean(document.querySelector("div#rulegraph")),
+    };
+}
+
 async function toPart(category, part) {
     await home();
     await press(() => link(category), category);
@@ -42,11 +56,14 @@ async function toPart(category, part) {
 }
 
 async function walk() {
-    const seen = { categories: {}, drawn: {} };
+    const seen = { front: await front(), categories: {}, drawn: {} };
     for (const name of ["Statistics", "Workflow"]) {
         await press(() => link(name), name);
         seen.drawn[name] = await until(() => document.querySelector("nav + div canvas, nav + div svg"));
+        seen.drawn[`${name}, alone`] = !pictures().some((image) => image.clientWidth > 0);
     }
+    await home();
+    seen.again = await front();
     for (const [category, parts] of Object.entries(categories)) {
         seen.categories[category] = {};
         for (const part of Object.keys(parts)) {
@@ -64,7 +81,7 @@ async function walk() {
     return seen;
 }
 
-walk().catch((error) => (watched.push(String(error)), { categories: {}, drawn: {} })).then((seen) => {
+walk().catch((error) => (watched.push(String(error)), { front: {}, again: {}, categories: {}, drawn: {} })).then((seen) => {
     const requests = performance.getEntriesByType("resource").map((entry) => entry.name).filter((name) => !name.startsWith("data:"));
     const note = document.createElement("script");
     note.type = "application/json";

@@ -18,7 +18,7 @@ def page_labels(wildcards):
 
 
 def figure_labels(wildcards):
-    return {"figure": wildcards.figure.replace("_", " ")}
+    return {"figure": catalogue.title_of(wildcards.figure)}
 
 
 def calibration_title(wildcards):

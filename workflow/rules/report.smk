@@ -1,4 +1,5 @@
-# The report: `snakemake report` makes its captions and pages, `snakemake report --report FILE.html` puts them together.
+# The report: `snakemake report` makes its captions and pages, `snakemake report --report FILE.html` puts them together, and
+# opens on the front page with the stylesheet and the metadata that `make report` gives it.
 
 
 report: "../report/front.rst"

@@ -6,7 +6,7 @@ A new figure is one module with ``draw(data) -> Figure`` and one line in ``FIGUR
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +21,12 @@ if TYPE_CHECKING:  # parsing the workflow must not cost an import of matplotlib
 
 @dataclass(frozen=True)
 class FigureSpec:
-    """A figure's module below ``filtercake.figures``, and what gives it something to show.
+    """A figure's title, its module below ``filtercake.figures``, and what gives it something to show.
 
     Attributes
     ----------
+    title : str
+        Its title for readers; with the paper's number where it is one of the paper's.
     module : str
         Its module.
     applies : callable
@@ -35,6 +37,7 @@ class FigureSpec:
         Whether it is drawn from a calibration's measurements alone.
     """
 
+    title: str
     module: str
     applies: Callable[..., bool] = lambda *_: True
     needs: Callable[[Study], bool] = lambda _: True
@@ -87,34 +90,68 @@ def _filters(study: Study) -> bool:
 
 
 FIGURES: dict[str, FigureSpec] = {
-    "fig03_porosity_trajectory": FigureSpec("trajectory", needs=_falls),
-    "fig05_truncation": FigureSpec("truncation", needs=_truncates),
-    "fig08_resistance_vs_porosity": FigureSpec("resistance_porosity"),
-    "fig09_porosity_vs_cohesion": FigureSpec("porosity_cohesion", _varies("cohesion")),
-    "fig10_resistance_vs_cohesion": FigureSpec("resistance_cohesion", _varies("cohesion")),
-    "fig12_distributions": FigureSpec("distributions", needs=_compares_products),
-    "fig13_growth_nucleation": FigureSpec("crystallizer", needs=_crystallizes),
-    "fig14_resistance_area": FigureSpec("filter_area", needs=_filters),
-    "filter_area_sensitivity": FigureSpec("filter_sensitivity", needs=_filters),
-    "sensitivity_poisson_restitution": FigureSpec(
-        "sensitivity", lambda points: _varies("poisson_ratio")(points) or _varies("restitution")(points)
+    "fig03_porosity_trajectory": FigureSpec("Porosity while a bed settles (Fig. 3)", "trajectory", needs=_falls),
+    "fig05_truncation": FigureSpec("What is packed of each size distribution (Fig. 5)", "truncation", needs=_truncates),
+    "fig08_resistance_vs_porosity": FigureSpec("Resistance against porosity (Fig. 8)", "resistance_porosity"),
+    "fig09_porosity_vs_cohesion": FigureSpec(
+        "Porosity against cohesion (Fig. 9)", "porosity_cohesion", _varies("cohesion")
     ),
-    "cake_compression": FigureSpec("compression", _compresses, needs=_pressed),
-    "packing_cross_section": FigureSpec("cross_section"),
-    "packing_flow": FigureSpec("flow", needs=_solves_flow),
-    "packing_porosity_profile": FigureSpec("profile", needs=_falls),
+    "fig10_resistance_vs_cohesion": FigureSpec(
+        "Resistance against cohesion (Fig. 10)", "resistance_cohesion", _varies("cohesion")
+    ),
+    "fig12_distributions": FigureSpec(
+        "Size distributions from the crystallizer (Fig. 12)", "distributions", needs=_compares_products
+    ),
+    "fig13_growth_nucleation": FigureSpec(
+        "Growth and nucleation in the crystallizer (Fig. 13)", "crystallizer", needs=_crystallizes
+    ),
+    "fig14_resistance_area": FigureSpec("Resistance and area of the filter (Fig. 14)", "filter_area", needs=_filters),
+    "filter_area_sensitivity": FigureSpec(
+        "Area of the filter for other media and pressure drops", "filter_sensitivity", needs=_filters
+    ),
+    "sensitivity_poisson_restitution": FigureSpec(
+        "Porosity against Poisson's ratio and restitution",
+        "sensitivity",
+        lambda points: _varies("poisson_ratio")(points) or _varies("restitution")(points),
+    ),
+    "cake_compression": FigureSpec(
+        "Porosity and resistance of cakes against pressure", "compression", _compresses, needs=_pressed
+    ),
+    "packing_cross_section": FigureSpec("Cut through a packing", "cross_section"),
+    "packing_flow": FigureSpec("Flow through a packing", "flow", needs=_solves_flow),
+    "packing_porosity_profile": FigureSpec("Porosity over the height of a bed", "profile", needs=_falls),
 }
 """Figures of studies."""
 
 CALIBRATION_FIGURES: dict[str, FigureSpec] = {
-    "calibration_objective": FigureSpec("calibration_objective"),
-    "calibration_parity": FigureSpec("calibration_parity"),
-    "calibration_resistance": FigureSpec("calibration_resistance"),
-    "calibration_predictions": FigureSpec("calibration_predictions", lambda predicts, _: predicts),
-    "filtration_fits": FigureSpec("filtration_fits", lambda _, measured: bool(measured.tests), of_tests=True),
-    "compressibility": FigureSpec("compressibility", lambda _, measured: bool(compressibility_by_csd(measured))),
+    "calibration_objective": FigureSpec("How well each value fits", "calibration_objective"),
+    "calibration_parity": FigureSpec("Modelled against measured resistance", "calibration_parity"),
+    "calibration_resistance": FigureSpec("Resistance of the packings, and what was measured", "calibration_resistance"),
+    "calibration_predictions": FigureSpec(
+        "Predicted resistances", "calibration_predictions", lambda predicts, _: predicts
+    ),
+    "filtration_fits": FigureSpec(
+        "Filtration tests and their fits", "filtration_fits", lambda _, measured: bool(measured.tests), of_tests=True
+    ),
+    "compressibility": FigureSpec(
+        "Resistance against pressure",
+        "compressibility",
+        lambda _, measured: bool(compressibility_by_csd(measured)),
+    ),
 }
 """Figures of calibrations."""
+
+ANSWERS = (
+    "fig14_resistance_area",
+    "fig10_resistance_vs_cohesion",
+    "cake_compression",
+    "calibration_resistance",
+    "calibration_parity",
+)
+"""Figures that answer what a study or a calibration asks, the first one first."""
+ANSWERS_ELSE = "fig08_resistance_vs_porosity"
+"""What answers where none of them is there."""
+CUT = "packing_cross_section"
 
 
 def figures_of(points: Iterable[Point], study: Study) -> list[str]:
@@ -126,6 +163,17 @@ def figures_of(points: Iterable[Point], study: Study) -> list[str]:
 def figures_of_calibration(predicts: bool, measurements: Measurements) -> list[str]:
     """Names of the figures a calibration has."""
     return [name for name, spec in CALIBRATION_FIGURES.items() if spec.applies(predicts, measurements)]
+
+
+def answering(figures: Collection[str]) -> list[str]:
+    """List those of some figures that answer what was asked, and the cut through a packing behind them."""
+    found = [name for name in ANSWERS if name in figures] or [name for name in (ANSWERS_ELSE,) if name in figures]
+    return [*found, *(name for name in (CUT,) if name in figures)]
+
+
+def title_of(figure: str) -> str:
+    """Title of a figure for readers."""
+    return (FIGURES | CALIBRATION_FIGURES)[figure].title
 
 
 def module_of(figure: str) -> str:

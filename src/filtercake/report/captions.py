@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 from PIL import Image
@@ -12,6 +12,7 @@ from PIL import Image
 from filtercake.crystals.csd import kept_volume
 from filtercake.figures import calibrated, selection
 from filtercake.figures.calibrated import CalibrationData
+from filtercake.figures.catalogue import answering, title_of
 from filtercake.figures.cohesion import FREE
 from filtercake.figures.filtered import filtered
 from filtercake.figures.selection import StudyData
@@ -19,6 +20,7 @@ from filtercake.figures.style import FOOTER
 from filtercake.packing.result import publish
 from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL, PROTOCOLS
 from filtercake.report.pages import engine_names, environment
+from filtercake.report.pictures import Picture, on_screen
 from filtercake.report.words import heading, number, with_interval
 from filtercake.results.resistance_columns import LAW_CI95
 from filtercake.study.config.sweep import SWEPT
@@ -31,8 +33,15 @@ MADE = {
 SUFFIX, FRONT = ".html.j2", "front"
 
 
+class Shown(NamedTuple):
+    """A figure on the front page: its title, and the picture itself."""
+
+    title: str
+    picture: Picture
+
+
 def write(templates: Path, figures: Iterable[Path], values: Mapping[str, Any], target: Path) -> None:
-    """Write one caption per figure, named as the figure, and ``front.html`` for the front page.
+    """Write one caption per figure, named as the figure, and ``front.html`` for the front page, with the answers.
 
     Parameters
     ----------
@@ -45,12 +54,14 @@ def write(templates: Path, figures: Iterable[Path], values: Mapping[str, Any], t
     target : Path
         Folder of the captions.
     """
-    prose = environment(templates)
+    prose, listed = environment(templates), list(figures)
     texts = {
         figure.stem: prose.get_template(figure.stem + SUFFIX).render(**values, footer=footer_of(figure))
-        for figure in figures
+        for figure in listed
     }
-    texts[FRONT] = prose.get_template(f"{FRONT}_{values['kind']}{SUFFIX}").render(**values)
+    files = {figure.stem: figure for figure in listed}
+    shown = [Shown(title_of(name), on_screen(files[name])) for name in answering(files)]
+    texts[FRONT] = prose.get_template(f"{FRONT}_{values['kind']}{SUFFIX}").render(**values, shown=shown)
     for name, text in texts.items():
         with publish(target / f"{name}.html") as temporary:
             temporary.write_text(text, encoding="utf-8")

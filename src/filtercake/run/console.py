@@ -9,11 +9,15 @@ from pathlib import Path
 
 from filtercake.packing.pack import MANIFEST
 from filtercake.results.tables import read_table
+from filtercake.run.answers import answers
 from filtercake.run.job import failure_reason
 from filtercake.study.points import Point
 
 SHOWN = 5
 """Failed packings listed by name; the rest is in the table."""
+
+REPORT = "report.html"
+"""Name of the report in the folder of the results, where ``make report`` puts it."""
 
 CHATTER = ("Select jobs to execute", "Execute ", "Loading script code", "Adding ")
 """Starts of Snakemake's lines that come again with every job or file; its log keeps them."""
@@ -56,8 +60,8 @@ def failed_packings(folder: Path, points: Iterable[str]) -> Iterator[tuple[str, 
 
 
 def success(results: Path, points: Points) -> str:
-    """Say what a calibration found, where every study's figures and tables are, and which packings failed."""
-    lines = []
+    """Say what studies and calibrations found, where figures, tables and report are, and which packings failed."""
+    lines: list[str] = []
     for study, group in points.items():
         folder = results / study
         made = {"figures": folder / "figures", "tables": folder / "tables", "numbers": folder / "summary.csv"}
@@ -65,18 +69,33 @@ def success(results: Path, points: Points) -> str:
         if answer.exists():
             made["numbers"] = answer
             lines += ["", *(f"{study}: {line}" for line in _answer(answer))]
+        table = list(answers(folder))
+        if table:
+            lines += ["", f"{study}, +- the half-width of the 95 % interval over the packings:"]
+            lines += [f"  {line}" for line in table]
         places = ", ".join(f"{what} in {path}" for what, path in made.items() if path.exists())
         lines.append(f"{study}: {places}" if places else f"{study}: packings in {folder / 'packings'}")
         failed = list(failed_packings(folder, group))
         if failed:
-            table = folder / "replicates.csv"
-            where = f"status failed in {table}; " if table.exists() else ""
+            rows = folder / "replicates.csv"
+            where = f"status failed in {rows}; " if rows.exists() else ""
             lines.append(f"{len(failed)} packings failed ({where}make retry):")
         lines += [f"  {point} r{replicate}: {reason}" for point, replicate, reason in failed[:SHOWN]]
         lines += [f"{study}: {line}" for line in _wide_intervals(folder / "summary.csv")]
         checked = folder / "tables" / "cross_check.csv"
         lines += [f"{study}: {_cross_check(checked)}"] if checked.exists() else []
-    return "\n".join(lines)
+    return "\n".join([*lines, *_report(results, points)])
+
+
+def _report(results: Path, studies: Iterable[str]) -> Iterator[str]:
+    """Name the report where there is one, and say so where the results are newer."""
+    report = results / REPORT
+    if not report.exists():
+        return
+    made = report.stat().st_mtime
+    numbers = [results / study / name for study in studies for name in ("summary.csv", "calibration.json")]
+    older = any(path.exists() and path.stat().st_mtime > made for path in numbers)
+    yield f"report: {report}{' (older than these results: make report)' if older else ''}"
 
 
 def _cross_check(table: Path) -> str:

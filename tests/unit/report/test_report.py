@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 from test_alum_figures import STUDIES
 from test_alum_figures import make as make_alum
 from test_calibration_figures import CASES
@@ -16,11 +20,12 @@ from test_figures import POINTS
 from test_figures import make as make_study
 
 from filtercake.figures.calibrated import CalibrationData, with_interval
-from filtercake.figures.catalogue import CALIBRATION_FIGURES, FIGURES
+from filtercake.figures.catalogue import CALIBRATION_FIGURES, FIGURES, answering, title_of
 from filtercake.figures.selection import StudyData
-from filtercake.figures.style import save
+from filtercake.figures.style import panels, save
 from filtercake.report import captions, markdown, pages, words
 from filtercake.report.catalogue import PAGES
+from filtercake.report.pictures import on_screen
 from filtercake.study.loading import load_study
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -115,6 +120,60 @@ def test_every_figure_has_a_caption_with_n_and_engine(
         for text in (caption, front):
             assert f"n = {good} packings" in text and "nan" not in text
     assert len(caption) > 300
+
+
+def test_the_front_page_shows_the_figures_that_answer_above_the_words(made_up: StudyData, tmp_path: Path) -> None:
+    names = ["fig09_porosity_vs_cohesion", "packing_cross_section", "fig10_resistance_vs_cohesion"]
+    for name in names:
+        save(Figure(figsize=(3.5, 2.0)), tmp_path / f"{name}.png", tmp_path / f"{name}.pdf")
+    captions.write(TEMPLATES, [tmp_path / f"{name}.png" for name in names], captions.study_values(made_up), tmp_path)
+    front = (tmp_path / "front.html").read_text()
+    found = re.findall(r'<img src="data:image/png;base64,([^"]+)" width="394" alt="([^"]+)">', front)
+    assert [title for _, title in found] == ["Resistance against cohesion (Fig. 10)", "Cut through a packing"]
+    assert front.index("<h2>") < front.index("<img") < front.rindex("</figure>") < front.index("Asked:")
+    for data, _ in found:
+        with Image.open(io.BytesIO(base64.b64decode(data))) as image:
+            assert image.size == (525, 300)  # 3.5 by 2.0 inches at 150 dpi
+
+
+def test_a_picture_on_a_screen_is_what_was_printed(tmp_path: Path) -> None:
+    figure, (axes,) = panels()
+    axes.plot([0.0, 1.0], [0.0, 1.0], color="#0072B2")
+    save(figure, tmp_path / "a.png", tmp_path / "a.pdf")
+    data = base64.b64decode(on_screen(tmp_path / "a.png").uri.removeprefix("data:image/png;base64,"))
+    with Image.open(io.BytesIO(data)) as small, Image.open(tmp_path / "a.png") as whole:
+        expected = np.asarray(whole.convert("RGB").resize(small.size, Image.Resampling.LANCZOS), dtype=float)
+        assert np.abs(np.asarray(small.convert("RGB"), dtype=float) - expected).max() < 16.0
+    assert len(data) < (tmp_path / "a.png").stat().st_size / 2
+
+
+@pytest.mark.parametrize(
+    ("figures", "shown"),
+    [
+        (
+            ["packing_cross_section", "fig08_resistance_vs_porosity"],
+            ["fig08_resistance_vs_porosity", "packing_cross_section"],
+        ),
+        (
+            ["fig08_resistance_vs_porosity", "fig10_resistance_vs_cohesion", "fig14_resistance_area"],
+            ["fig14_resistance_area", "fig10_resistance_vs_cohesion"],
+        ),
+        (["calibration_objective", "calibration_parity"], ["calibration_parity"]),
+        ([], []),
+    ],
+)
+def test_the_figures_that_answer_come_first(figures: list[str], shown: list[str]) -> None:
+    assert answering(figures) == shown
+
+
+def test_every_figure_has_a_title_of_its_own() -> None:
+    titles = [title_of(name) for name in (*FIGURES, *CALIBRATION_FIGURES)]
+    assert len(set(titles)) == len(titles)
+    assert all("_" not in title and title[0].isupper() and len(title) < 60 for title in titles)
+    for name in FIGURES:
+        number = re.match(r"fig0?(\d+)_", name)
+        assert ("(Fig. " in title_of(name)) == bool(number)
+        assert number is None or title_of(name).endswith(f"(Fig. {number[1]})")
 
 
 @pytest.mark.parametrize("figure", ["fig09_porosity_vs_cohesion", "fig10_resistance_vs_cohesion"])
