@@ -92,7 +92,7 @@ def commented(text):
     [
         ("src/filtercake/crystals/csd.py", {"csd", "packing", "points", *AFTER_PACKING}),
         ("src/filtercake/packing/cloud.py", {"packing", "points", *AFTER_PACKING}),
-        ("liggghts_templates/packing.in.j2", {"packing", *AFTER_PACKING}),
+        ("liggghts_templates/packing.in.j2", set()),  # nothing of this study is packed by LIGGGHTS
         ("src/filtercake/packing/porosity.py", AFTER_PACKING),
         ("src/filtercake/results/paper_tables.py", {"tables", "provenance"}),
         ("src/filtercake/figures/cross_section.py", {"figure", "provenance"}),
