@@ -6,12 +6,25 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
 PARTS = ("Snakefile", "config", "workflow", "profiles", "liggghts_templates", "src", "docs")
 TINY = "config/test/tiny.yaml"
+
+
+@contextmanager
+def edited(path, change):
+    """Change a file and put it back, its time included."""
+    before, times = path.read_text(), path.stat()
+    path.write_text(change(before))
+    try:
+        yield
+    finally:
+        path.write_text(before)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
 @dataclass

@@ -1,14 +1,12 @@
 """The tiny study end to end: what it leaves behind, and what an edit makes it redo."""
 
 import json
-import os
 import shutil
-from contextlib import contextmanager
 
 import numpy as np
 import pandas as pd
 import pytest
-from checkouts import Checkout
+from checkouts import Checkout, edited
 
 from filtercake.figures.catalogue import FIGURES
 from filtercake.filtration.resistance import CARMAN_CONSTANT, CARMAN_CONSTANT_CI95
@@ -65,18 +63,6 @@ def test_says_where_the_figures_are_and_how_far_it_is(finished):
 
 def test_a_second_call_does_nothing(finished):
     assert not finished.planned()
-
-
-@contextmanager
-def edited(path, change):
-    """Change a file and put it back, its time included."""
-    before, times = path.read_text(), path.stat()
-    path.write_text(change(before))
-    try:
-        yield
-    finally:
-        path.write_text(before)
-        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
 def changed(text):
