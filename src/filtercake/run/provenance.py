@@ -86,14 +86,16 @@ def _packages(folder: Path) -> tuple[Path, ...]:
 
 
 def packing_code(engine: str) -> str:
-    """Hash of the code and the deck templates behind packings by an engine.
+    """Hash of the code behind packings by an engine, and of the deck template that it fills, if any.
 
     Raises
     ------
     FileNotFoundError
         If there is no such engine.
     """
-    return code_hash([*packing_sources(engine), *sorted(template_folder().glob("*.j2"))])
+    name = ENGINES[engine].template
+    deck = template_folder() / name
+    return code_hash([*packing_sources(engine), *([deck] if name and deck.exists() else [])])
 
 
 def code_hash(files: Iterable[Path]) -> str:

@@ -78,6 +78,8 @@ class Engine(ABC):
         Files in its folder that tell why a packing failed.
     by_hand : str
         Command that runs what :meth:`write_input` wrote; empty where that is nothing.
+    template : str
+        Name of the deck template that it fills; empty where there is none.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Engine(ABC):
     compiles: bool = False
     evidence: tuple[str, ...] = ()
     by_hand: str = ""
+    template: str = ""
 
     @classmethod
     def suits(cls, scene: Scene) -> bool:  # noqa: ARG003
