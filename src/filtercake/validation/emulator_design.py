@@ -13,7 +13,7 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -104,20 +104,25 @@ def members(draw: int, rounds: int) -> Iterator[Member]:
     draw : int
         Seed of what is held out: another one draws other distributions and other clouds.
     rounds : int
-        Rounds of four cells and two beds for the training, and one or two held-out packings.
+        Rounds of five cells, one of them without attraction, and two beds for the training, and one or two packings
+        that are held out.
     """
     cells, beds = _sequence(FILTRATION_PROTOCOL), _sequence(GRAVITY_PROTOCOL)
     other_cells, other_beds = _random(FILTRATION_PROTOCOL, draw), _random(GRAVITY_PROTOCOL, draw)
+    loose = map(without_attraction, _random(FILTRATION_PROTOCOL, draw + 1))
     for number in range(rounds):
-        for _ in range(4):
-            yield next(cells)
+        four = [next(cells) for _ in range(4)]
+        yield from four
+        yield without_attraction(four[number % 4])
         for _ in range(2):
             yield next(beds)
-        # 60 held-out cells and 30 beds after 48 rounds
+        # after 48 rounds 60 held-out cells, 12 more without attraction, and 30 beds
         for _ in range((5 * (number + 1)) // 4 - (5 * number) // 4 if number < 48 else 0):
             yield next(other_cells)
         if number % 8 < 5 and number < 48:
             yield next(other_beds)
+        if number % 4 == 0 and number < 48:
+            yield next(loose)
 
 
 def _sequence(protocol: str) -> Iterator[Member]:
@@ -160,6 +165,11 @@ def _member(role: str, family: str, point: FloatArray, protocol: str, seed: int)
     else:
         scene = bed_scene(csd, mu, point[5:8], seed)
     return None if scene is None else Member(role, family, scene, 0)
+
+
+def without_attraction(member: Member) -> Member:
+    """Make the cell that is pressed at once, without attraction, of the same spheres."""
+    return replace(member, scene=replace(member.scene, adhesion=0.0, cohesion=0.0))
 
 
 def friction_of(share: float) -> float:
