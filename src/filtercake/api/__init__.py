@@ -1,7 +1,7 @@
 """The steps of a study as functions: the one import that a notebook needs.
 
-``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`porosity`, :func:`profile`,
-:func:`permeability`, :func:`permeabilities`, :func:`resistance`, :func:`filter_area`, :func:`filtration_test`,
+``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`predict`, :func:`porosity`,
+:func:`profile`, :func:`permeability`, :func:`permeabilities`, :func:`resistance`, :func:`filter_area`, :func:`filtration_test`,
 :func:`filtration_tests`, :func:`crystallizer`, :func:`batch_filter`, :func:`deliquoring`, :func:`cost`, :func:`export`
 and :func:`rerun`. It may import from every room but ``cli``, ``report`` and ``validation``.
 """
@@ -27,6 +27,7 @@ from filtercake.api.permeability import (
     permeabilities,
     permeability,
 )
+from filtercake.api.predict import Prediction, PredictOptions, predict
 from filtercake.api.steps import (
     Distribution,
     FilterOptions,
@@ -60,6 +61,8 @@ __all__ = [
     "PackingPermeability",
     "PackingPorosity",
     "PermeabilityOptions",
+    "PredictOptions",
+    "Prediction",
     "Resistance",
     "ResistanceOptions",
     "batch_filter",
@@ -77,6 +80,7 @@ __all__ = [
     "permeabilities",
     "permeability",
     "porosity",
+    "predict",
     "profile",
     "rerun",
     "resistance",

@@ -47,6 +47,7 @@ EXAMPLES = {
     "csd": "filtercake csd --kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200",
     "pack": "filtercake pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 "
     "--porosity-ci95-target 0.003 --output packing",
+    "predict": "filtercake predict --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --friction 0.1 --adhesion-mJ-m2 10",
     "resistance": "filtercake resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5",
     "export": "filtercake export pmma pmma_50_s50_mu0_1a2b3c4d --output report",
     "rerun": "filtercake rerun report",
@@ -121,6 +122,7 @@ def build_parser() -> words.Parser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     _add_csd(commands)
     _add_pack(commands)
+    _add_predict(commands)
     _add_porosity(commands)
     _add_permeability(commands)
     _add_resistance(commands)
@@ -179,6 +181,16 @@ def _add_pack(commands: Any) -> None:
         "kept. Default: packing",
     )
     parser.add_argument("--replace", action="store_true", help="packings of other options in that folder may be lost")
+
+
+def _add_predict(commands: Any) -> None:
+    text = (
+        "Estimate porosity and specific cake resistance (m/kg) at once, with 95 % intervals, from what a few hundred "
+        "packings were: nothing is packed."
+    )
+    parser = _command(commands, "predict", _run_predict, text)
+    words.add_source(parser)
+    words.add_model(parser.add_argument_group("cake"), api.PredictOptions)
 
 
 def _add_porosity(commands: Any) -> None:
@@ -380,6 +392,29 @@ def _run_pack(options: argparse.Namespace) -> int:
     )
     print(f"packings are in {options.output}")
     return status
+
+
+def _run_predict(options: argparse.Namespace) -> int:
+    source = api.distribution(**words.source(options))
+    found = api.predict(source, **words.given(options, api.PredictOptions.model_fields))
+    _say_understood(options, source)
+    for warning in found.warnings:
+        _say(f"warning: {words.with_flags(warning, vars(options))}")
+    for doubt in found.outside:
+        _say(f"warning: outside of what was packed, and so with a wider interval: {doubt}")
+    if options.json:
+        return _print_json(asdict(found))
+    return _print_lines(
+        [
+            ("porosity", found.porosity, f"{_interval(found.porosity_ci95, '')}, mean of many packings"),
+            ("of one packing", found.porosity, _interval(found.porosity_packing_ci95, "")),
+            *_known("porosity at the medium", found.porosity_at_medium),
+            *_known("compressibility n", found.compressibility),
+            *_known("load over strength", found.load_over_strength),
+            *_resistances(asdict(found), _interval(found.resistance_ci95_m_kg, "m/kg")),
+            ("learnt from", found.packings, f"packings by {found.protocol}"),
+        ]
+    )
 
 
 def _known(name: str, value: float | None, unit: str = "") -> list[Line]:

@@ -8,7 +8,6 @@ was stopped.
 
 from __future__ import annotations
 
-import json
 import math
 import tempfile
 import time
@@ -26,6 +25,7 @@ from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CellError, CloudError, EngineError, PackingRejected
 from filtercake.packing.cloud import SETTLED_POROSITY
 from filtercake.packing.compression import CompressionCurve
+from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.pack import pack
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import write_json
@@ -161,7 +161,8 @@ def _member(role: str, family: str, point: FloatArray, protocol: str, seed: int)
     mu = friction_of(point[4])
     if protocol == FILTRATION_PROTOCOL:
         spheres = spheres_for(csd)
-        scene = None if spheres > MOST_SPHERES else cell_scene(csd, mu, point[5] < 0.6, spheres, seed)
+        attraction = "adhesion" if point[5] < 0.6 else "cohesion"
+        scene = None if spheres > MOST_SPHERES else cell_scene(csd, mu, attraction, spheres, seed)
     else:
         scene = bed_scene(csd, mu, point[5:8], seed)
     return None if scene is None else Member(role, family, scene, 0)
@@ -169,7 +170,11 @@ def _member(role: str, family: str, point: FloatArray, protocol: str, seed: int)
 
 def without_attraction(member: Member) -> Member:
     """Make the cell that is pressed at once, without attraction, of the same spheres."""
-    return replace(member, scene=replace(member.scene, adhesion=0.0, cohesion=0.0))
+    return replace(member, scene=_bare(member.scene))
+
+
+def _bare(scene: Scene) -> Scene:
+    return replace(scene, adhesion=0.0, cohesion=0.0)
 
 
 def friction_of(share: float) -> float:
@@ -188,12 +193,13 @@ def _number_per_volume(csd: CrystalSizeDistribution) -> float:
     return math.pi / 6.0 / csd.mean_particle_volume
 
 
-def cell_scene(csd: CrystalSizeDistribution, friction: float, adheres: bool, spheres: int, seed: int) -> Scene:
+def cell_scene(csd: CrystalSizeDistribution, friction: float, attraction: str, spheres: int, seed: int) -> Scene:
     """Make the scene of a pressed cell; neither the strength of its attraction nor the pressure counts."""
-    sticks = {"adhesion_mJ_m2": 10.0} if adheres else {"cohesion_kJ_m3": 50.0}
+    sticks = {"cohesion_kJ_m3": 50.0} if attraction == "cohesion" else {"adhesion_mJ_m2": 10.0}
     material = {"density_kg_m3": 1500.0, "friction": friction, "trust_units": True, **sticks}
     packing = {"protocol": FILTRATION_PROTOCOL, "pressure_kPa": 50.0, "particles": spheres, "seed": seed}
-    return _scene(csd, CELL_SAUTER_UM, material, packing).as_packed()
+    scene = _scene(csd, CELL_SAUTER_UM, material, packing).as_packed()
+    return scene if attraction != "none" else _bare(scene)
 
 
 def bed_scene(csd: CrystalSizeDistribution, friction: float, point: FloatArray, seed: int) -> Scene | None:
@@ -204,10 +210,14 @@ def bed_scene(csd: CrystalSizeDistribution, friction: float, point: FloatArray, 
         "density_kg_m3": round(float(np.interp(point[2], [0.0, 1.0], BED_DENSITY)), 1),
         "friction": friction,
         "cohesion_kJ_m3": round(LARGEST_COHESION * sticky, 2),
-        "trust_units": True,
     }
-    scene = _scene(csd, sauter, material, {"seed": seed, "engine": "embedded"})
+    scene = settled_scene(csd, sauter, material, seed)
     return None if scene.particles > MOST_BED_SPHERES or scene.strength_over_load > MOST_STICKY else scene
+
+
+def settled_scene(csd: CrystalSizeDistribution, sauter_um: float, material: dict[str, Any], seed: int) -> Scene:
+    """Make the scene of a bed settled by the study's defaults."""
+    return _scene(csd, sauter_um, {**material, "trust_units": True}, {"seed": seed, "engine": Embedded.name})
 
 
 def _scene(csd: CrystalSizeDistribution, sauter_um: float, material: dict[str, Any], packing: dict[str, Any]) -> Scene:
@@ -220,7 +230,7 @@ def _scene(csd: CrystalSizeDistribution, sauter_um: float, material: dict[str, A
 
 def _between(low: float, high: float, share: float) -> float:
     """Value between two that is as often in any factor of them."""
-    return low * (high / low) ** share
+    return low * math.exp(share * math.log(high / low))
 
 
 def _classes(size: ArrayLike, share: ArrayLike) -> CrystalSizeDistribution:
