@@ -230,7 +230,7 @@ def _scene(csd: CrystalSizeDistribution, sauter_um: float, material: dict[str, A
 
 def _between(low: float, high: float, share: float) -> float:
     """Value between two that is as often in any factor of them."""
-    return low * math.exp(share * math.log(high / low))
+    return float(low * (high / low) ** share)
 
 
 def _classes(size: ArrayLike, share: ArrayLike) -> CrystalSizeDistribution:
