@@ -3,7 +3,9 @@
 ``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`predict`, :func:`porosity`,
 :func:`profile`, :func:`permeability`, :func:`permeabilities`, :func:`resistance`, :func:`filter_area`,
 :func:`filtration_test`, :func:`filtration_tests`, :func:`crystallizer`, :func:`batch_filter`, :func:`deliquoring`,
-:func:`cost`, :func:`export` and :func:`rerun`. It may import from every room but ``cli``, ``report`` and ``validation``.
+:func:`cost`, :func:`export` and :func:`rerun`.
+
+It may import from every room but ``cli``, ``report`` and ``validation``.
 """
 
 from filtercake.api.crystallizer import CrystallizerOptions, CrystallizerProduct, crystallizer

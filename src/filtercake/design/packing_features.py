@@ -34,7 +34,7 @@ def shape_features(csd: CrystalSizeDistribution) -> FloatArray:
     spread, skew = _moments(size, csd.volume_fraction)
     surface = csd.volume_fraction / csd.size
     surface_spread, _ = _moments(size, surface / surface.sum())
-    loose = yu_zou_standish(csd, LOOSE) - LOOSE
+    loose = round(yu_zou_standish(csd, LOOSE) - LOOSE, 12) + 0.0  # not -0 of one size
     return np.array([farr_groot(csd, RODS), loose, spread, skew, surface_spread])
 
 

@@ -9,9 +9,11 @@ was stopped.
 from __future__ import annotations
 
 import math
+import multiprocessing
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -328,25 +330,33 @@ UNSEEN: Final[dict[str, Callable[..., CrystalSizeDistribution]]] = {"power law":
 """Shapes that are only held out."""
 
 
-def compute(folder: Path, listed: Sequence[Member], seconds: float, say: Say = lambda _: None) -> None:
-    """Make the packings that ``folder`` does not hold yet, one after the other, as long as time (s) is left."""
+def compute(folder: Path, listed: Sequence[Member], processes: int, say: Say = lambda _: None) -> None:
+    """Make the packings that ``folder`` does not hold yet, in their order, in several processes."""
     folder.mkdir(parents=True, exist_ok=True)
-    end = time.monotonic() + seconds
-    for number, member in enumerate(listed):
-        path = folder / member.name
-        if path.exists():
-            continue
-        if time.monotonic() > end:
-            say(f"stopped before packing {number + 1} of {len(listed)}: the time is over")
-            return
-        row = packed(member)
-        write_json(path, row)
-        porosity = row["porosity"][-1] if row["porosity"] else None
-        what = f"{member.scene.protocol}, {member.role}, {member.family}, friction {member.scene.friction:g}"
-        say(
-            f"{number + 1}/{len(listed)} {what}, {member.scene.particles} spheres: {porosity} "
-            f"in {row['seconds']:.1f} s {row['reason']}"
-        )
+    missing = [member for member in listed if not (folder / member.name).exists()]
+    # a kernel that numba compiles while another process forks is not there for it
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        running = [pool.submit(_keep, folder / member.name, member) for member in missing]
+        try:
+            for number, (member, future) in enumerate(zip(missing, running, strict=True)):
+                say(f"{number + 1}/{len(missing)} {_said(member, future.result())}")
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _keep(path: Path, member: Member) -> dict[str, Any]:
+    row = packed(member)
+    write_json(path, row)
+    return row
+
+
+def _said(member: Member, row: Mapping[str, Any]) -> str:
+    scene = member.scene
+    what = f"{scene.protocol}, {member.role}, {member.family}, friction {scene.friction:g}, {scene.particles} spheres"
+    porosity = f"porosity {row['porosity'][-1]:.4f}" if row["porosity"] else "no porosity"
+    return f"{what}: {porosity}, {row['seconds']:.1f} s {row['reason']}"
 
 
 def packed(member: Member) -> dict[str, Any]:
