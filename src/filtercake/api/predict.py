@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -14,6 +14,7 @@ from filtercake.design.emulator_file import shipped
 from filtercake.errors import ConfigError, Problem
 from filtercake.filtration.compressible import CakeAverage, cake_average
 from filtercake.filtration.resistance import CARMAN, law_of
+from filtercake.packing.cloud import NARROW_PARTICLES, cell_for
 from filtercake.packing.compression import CompressionCurve
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene
@@ -144,7 +145,7 @@ def predict(source: Distribution, **options: Any) -> Prediction:
         allowed = f"needs a packing to solve the flow in; allowed here: {', '.join(ALWAYS)}"
         raise ConfigError([Problem(str(ORIGIN), "law", repr(given.law), allowed)])
     study = _study(source, given)
-    scene = base_point(study, csd_name(study), engine_choice.choose).scene
+    scene = _as_large_as_packed(base_point(study, csd_name(study), engine_choice.choose).scene)
     model = shipped()[scene.protocol]
     found = model.estimate(scene)
     cake = _cake(scene, found.curve)
@@ -170,9 +171,16 @@ def _study(source: Distribution, given: PredictOptions) -> LoadedStudy:
         name: value for name, value in given if value is not None and name not in ("protocol", "pressure_kPa", "law")
     }
     packing: dict[str, Any] = {"protocol": given.protocol, "engine": Embedded.name}
+    if given.protocol == FILTRATION_PROTOCOL:
+        packing["particles"] = NARROW_PARTICLES
     if given.pressure_kPa is not None:
         packing["pressure_kPa"] = given.pressure_kPa
     return load(source.options, *as_packed_by_default(own, packing), given.law, packed=False)
+
+
+def _as_large_as_packed(scene: Scene) -> Scene:
+    """Give a pressed cell the spheres that ``pack`` would take, however many."""
+    return replace(scene, particles=cell_for(scene.csd)) if scene.is_pressed else scene
 
 
 def _cake(scene: Scene, curve: CompressionCurve) -> CakeAverage:
