@@ -58,7 +58,7 @@ BED_SAUTER_UM: Final = (10.0, 400.0)
 BED_DENSITY: Final = (1000.0, 2700.0)
 """kg/m3."""
 MOST_STICKY: Final = 200.0
-"""Strength of the contacts over the stress half way down a bed, at most: about that of 100 kJ/m3 on the paper's PMMA."""
+"""Strength of the contacts over the stress half way down a bed, at most; 100 kJ/m3 on the paper's PMMA has 167."""
 CLASS_STEP: Final = 0.2
 """Width of a class in the logarithm of the size, at most."""
 FEWEST_CLASSES: Final = 6

@@ -20,7 +20,7 @@ from filtercake.api.predict import predict
 from filtercake.api.steps import distribution
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.design.emulator import FEATURES, FRICTION, MEANINGS, CurveEstimate, Emulator, features_of
-from filtercake.design.packing_features import counting_spheres
+from filtercake.design.packing_features import SHAPE_FEATURES, counting_spheres, shape_features
 from filtercake.errors import ConfigError
 from filtercake.packing.compression import LOADS
 from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL, Scene
@@ -251,6 +251,31 @@ def ranges(model: Emulator) -> list[tuple[str, str, str]]:
             _, meaning, shown = MEANINGS[name]
             found.append((meaning, f"{shown(float(low)):.3g}", f"{shown(float(high)):.3g}"))
     return found
+
+
+def widths(table: pd.DataFrame, protocol: str) -> dict[str, float]:
+    """Say how wide distributions were trained on.
+
+    Returns
+    -------
+    dict
+        ``spheres`` (most of a packing); largest over smallest size, of all (``ratio``), of two sizes (``two``) and of
+        two sizes with a quarter of fines or more (``with_fines``); geometric standard deviation of a lognormal
+        (``lognormal``), as it was cut.
+    """
+    rows = accepted(table, protocol, TRAINING)
+    csds = [scene_of(row).csd for row in rows.to_dict("records")]
+    ratio = np.array([csd.largest / csd.smallest for csd in csds])
+    fine = np.array([csd.volume_fraction[0] for csd in csds])
+    spread = np.array([shape_features(csd)[SHAPE_FEATURES.index("spread")] for csd in csds])
+    two, lognormal = (rows["family"].to_numpy() == name for name in ("two sizes", "lognormal"))
+    return {
+        "spheres": float(rows["particles"].max()),
+        "ratio": float(ratio.max()),
+        "two": float(ratio[two].max()),
+        "with_fines": float(ratio[two & (fine >= 0.25)].max()),
+        "lognormal": math.exp(float(spread[lognormal].max())),
+    }
 
 
 def counts(table: pd.DataFrame) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.permeability.measure import SPREAD
 from filtercake.study import limits
 from filtercake.user_files import templates
-from filtercake.validation import emulator_evidence, pressure_evidence, resistance_law
+from filtercake.validation import emulator_design, emulator_evidence, pressure_evidence, resistance_law
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
 from filtercake.validation.permeability import BED, CELL, LATTICE, LAYERED, known_constant
 from filtercake.validation.pressure import GRAVITY_BED, INVARIANCE, MODULUS, PATH_STRESS, PATHS
@@ -254,9 +254,11 @@ def emulator(
         missed=_records(drawn[~drawn["inside"].astype(bool)]),
         by_load={name: _records(emulator_evidence.left_one_out(packings, models[name])) for name in models},
         ranges={name: emulator_evidence.ranges(models[name]) for name in models},
+        widths={name: emulator_evidence.widths(packings, name) for name in models},
         learning=_records(emulator_evidence.learning(packings, draw)),
         beyond=_records(emulator_evidence.beyond(packings)),
         ensembles=_records(emulator_evidence.ensembles(models, means)),
+        beds=(emulator_design.BED_SAUTER_UM, emulator_design.BED_DENSITY, emulator_design.MOST_STICKY),
         counts=_records(emulator_evidence.counts(packings)),
     )
 
