@@ -118,12 +118,12 @@ def members(draw: int, rounds: int) -> Iterator[Member]:
         yield without_attraction(four[number % 4])
         for _ in range(2):
             yield next(beds)
-        # after 48 rounds 60 held-out cells, 12 more without attraction, and 30 beds
-        for _ in range((5 * (number + 1)) // 4 - (5 * number) // 4 if number < 48 else 0):
+        # after 28 rounds 42 held-out cells, 7 more without attraction, and 14 beds
+        for _ in range(1 + number % 2):
             yield next(other_cells)
-        if number % 8 < 5 and number < 48:
+        if number % 2 == 1:
             yield next(other_beds)
-        if number % 4 == 0 and number < 48:
+        if number % 4 == 0:
             yield next(loose)
 
 
