@@ -106,7 +106,7 @@ def members(draw: int, rounds: int) -> Iterator[Member]:
     draw : int
         Seed of what is held out: another one draws other distributions and other clouds.
     rounds : int
-        Rounds of five cells, one of them without attraction, and two beds for the training, and one or two packings
+        Rounds of five cells, one of them without attraction, and four beds for the training, and one or two packings
         that are held out.
     """
     cells, beds = _sequence(FILTRATION_PROTOCOL), _sequence(GRAVITY_PROTOCOL)
@@ -116,12 +116,12 @@ def members(draw: int, rounds: int) -> Iterator[Member]:
         four = [next(cells) for _ in range(4)]
         yield from four
         yield without_attraction(four[number % 4])
-        for _ in range(2):
+        for _ in range(4):
             yield next(beds)
-        # after 28 rounds 42 held-out cells, 7 more without attraction, and 14 beds
+        # after 28 rounds 42 held-out cells, 7 more without attraction, and 21 beds
         for _ in range(1 + number % 2):
             yield next(other_cells)
-        if number % 2 == 1:
+        if number % 4 < 3:
             yield next(other_beds)
         if number % 4 == 0:
             yield next(loose)
