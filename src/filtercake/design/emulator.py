@@ -20,6 +20,7 @@ from filtercake.design.packing_features import (
     FALL_FEATURES,
     HALF_FRICTION,
     SHAPE_FEATURES,
+    SLIGHT,
     counting_spheres,
     fall_features,
     friction_feature,
@@ -31,13 +32,13 @@ from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL, Scen
 from filtercake.statistics import quantile
 from filtercake.units import FloatArray
 
-FRICTION: Final = "friction"
+FRICTION, SLIGHT_FRICTION = "friction", "slight_friction"
 AT_ONCE, ADHESION = "pressed_at_once", "adhesion"
 """Features of pressed cakes that are 0 or 1: without attraction, so that the load is there at once; the attraction is
 a size-true adhesion, not a cohesion."""
 FEATURES: Final = {
     FILTRATION_PROTOCOL: (*SHAPE_FEATURES, FRICTION, AT_ONCE, ADHESION),
-    GRAVITY_PROTOCOL: (*SHAPE_FEATURES, FRICTION, *FALL_FEATURES),
+    GRAVITY_PROTOCOL: (*SHAPE_FEATURES, FRICTION, SLIGHT_FRICTION, *FALL_FEATURES),
 }
 FARTHEST: Final = 0.5
 """How far outside the range of a feature, in widths of that range, an estimate is still given."""
@@ -66,11 +67,15 @@ MEANINGS: Final[dict[str, tuple[str, str, Callable[[float], float]]]] = {
     "skew": ("distribution", "third moment's cube root of ln d by volume", _as_it_is),
     "surface_spread": ("distribution", "standard deviation of ln d by surface", _as_it_is),
     FRICTION: (FRICTION, "friction", lambda share: HALF_FRICTION * _from_share(share)),
-    "stickiness": ("cohesion_kJ_m3", "cube root of strength over stress of impact", _from_share),
+    "stickiness": (
+        "cohesion_kJ_m3",
+        "strength of the contacts over the stress of impact",
+        lambda share: _from_share(share) ** 1.5,
+    ),
     "impact": ("distribution", "stress of impact over E*", math.exp),
     "depth": ("distribution", "depth of the solids over the Sauter mean", math.exp),
 }
-"""Option, meaning and way back of each feature."""
+"""Option, meaning and way back of each feature by which what lies outside is told."""
 
 OfCurve = Callable[[CompressionCurve], float]
 """A number that follows from the porosity against the load."""
@@ -80,7 +85,7 @@ def features_of(scene: Scene) -> FloatArray:
     """Return the features of a scene that its protocol's model has, shape (p,)."""
     shared = [*shape_features(scene.csd), friction_feature(scene.friction)]
     if not scene.is_pressed:
-        return np.array([*shared, *fall_features(scene)])
+        return np.array([*shared, friction_feature(scene.friction, SLIGHT), *fall_features(scene)])
     attraction = scene.attraction
     return np.array([*shared, float(attraction == "none"), float(attraction == "adhesion")])
 
@@ -264,6 +269,7 @@ class Emulator:
         return [
             Doubt(names[k], float(features[k]), float(self.lowest[k]), float(self.highest[k]), float(distance[k]))
             for k in np.flatnonzero(distance > ROUNDING)
+            if names[k] in MEANINGS
         ]
 
 

@@ -20,6 +20,9 @@ LOOSE: Final = 0.44
 HALF_FRICTION: Final = 0.18
 """Friction that loosens equal spheres half as much as any does: 0.362 without, 0.4448 at 1 (docs/pressure.md)."""
 
+SLIGHT: Final = 0.03
+"""Friction that keeps a sticky bed half as loose as any does: 0.353 without, 0.462 at 0.05, 0.466 at 0.3 (PMMA)."""
+
 SHAPE_FEATURES: Final = ("close_packing", "linear_packing", "spread", "skew", "surface_spread")
 """Names of what :func:`shape_features` returns."""
 
@@ -44,9 +47,9 @@ def _moments(values: FloatArray, weights: FloatArray) -> tuple[float, float]:
     return math.sqrt(float(weights @ centred**2)), float(np.cbrt(weights @ centred**3))
 
 
-def friction_feature(friction: float) -> float:
-    """Share of the loosening by friction that a coefficient has reached, 0 to 1."""
-    return friction / (friction + HALF_FRICTION)
+def friction_feature(friction: float, half: float = HALF_FRICTION) -> float:
+    """Share of the loosening by friction that a coefficient has reached, 0 to 1; a half at ``half``."""
+    return friction / (friction + half)
 
 
 def counting_spheres(csd: CrystalSizeDistribution, particles: int) -> float:
@@ -68,13 +71,13 @@ def fall_features(scene: Scene) -> FloatArray:
 
     The contacts hold ``p_c`` (:func:`filtercake.packing.contact_law.cohesive_strength`), an impact from half the height
     of the cloud brings ``rho v^2``; the bed's own weight is in about the same ratio to it in all beds. The first is
-    ``t/(1 + t)`` with t the cube root of their ratio, which goes as the cohesion; the second and the third are
-    logarithms.
+    ``t/(1 + t)`` with t their ratio to the power 2/3, which goes as the square of the cohesion; the second and the
+    third are logarithms.
     """
     strength = contact_law.cohesive_strength(scene.cohesion, scene.youngs_modulus, scene.poisson_ratio)
     speed = scene.settling_velocity**2 + GRAVITY * scene.cloud_height
     impact = scene.density * speed
     modulus = contact_law.effective_modulus(scene.youngs_modulus, scene.poisson_ratio)
-    ratio = float(np.cbrt(strength / impact))
+    ratio = (strength / impact) ** (2.0 / 3.0)
     solids = scene.particles * scene.csd.mean_particle_volume / scene.box_length**2
     return np.array([ratio / (1.0 + ratio), math.log(impact / modulus), math.log(solids / scene.csd.sauter_mean)])

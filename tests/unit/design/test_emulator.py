@@ -171,7 +171,7 @@ def shrunk(model: Emulator) -> Emulator:
 
 def test_every_feature_that_is_a_number_has_a_meaning() -> None:
     named = {name for names in FEATURES.values() for name in names}
-    assert named - set(MEANINGS) == {"pressed_at_once", "adhesion"}
+    assert named - set(MEANINGS) == {"pressed_at_once", "adhesion", "slight_friction"}
     assert 0.0 < FARTHEST <= 1.0
 
 

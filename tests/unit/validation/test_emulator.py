@@ -108,7 +108,7 @@ def synthetic(points: int, noise: float, seed: int = 1) -> Training:
     random = np.random.default_rng(seed)
     features = random.uniform(0.0, 1.0, (points, len(FEATURES[GRAVITY_PROTOCOL])))
     friction = features[:, FEATURES[GRAVITY_PROTOCOL].index(FRICTION)]
-    truth = 0.36 + 0.08 * friction - 0.05 * features[:, 0] + 0.02 * np.sin(3.0 * features[:, 6])
+    truth = 0.36 + 0.08 * friction - 0.05 * features[:, 0] + 0.02 * np.sin(3.0 * features[:, 7])
     spheres = np.full(points, 1000.0)
     return Training(
         features, (truth + noise * random.normal(size=points))[:, None], spheres, np.arange(points, dtype=np.float64)
