@@ -1,9 +1,9 @@
 """The packings that the instant estimate is trained on and held against: a space-filling design and how it is packed.
 
-Shapes of distributions, friction and attraction follow a scrambled Sobol sequence, the kinds of distribution in turn, so
-that what is made first is spread over the space; what is held out comes from plain random numbers of another seed, and from shapes that are not trained on as
-well. Each packing is kept in a file of its own under a digest of all that decides it, so that a run goes on where it
-was stopped.
+Shapes of distributions, friction and attraction follow a scrambled Sobol sequence, the kinds of distribution in turn,
+so that what is made first is spread over the space; what is held out comes from plain random numbers of another seed,
+and from shapes that are not trained on as well. Each packing is kept in a file of its own under a digest of all that
+decides it, so that a run goes on where it was stopped.
 """
 
 from __future__ import annotations
