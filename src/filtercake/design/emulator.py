@@ -244,7 +244,7 @@ class Emulator:
         doubts = self._doubts(features)
         farthest = max((doubt.distance for doubt in doubts), default=0.0)
         if farthest > FARTHEST:
-            raise ConfigError([doubt.problem() for doubt in doubts if doubt.distance > FARTHEST])
+            raise ConfigError([max(doubts, key=lambda doubt: doubt.distance).problem()])
         scaled = self.scaled(features)[np.newaxis]
         found = [part.at(scaled) for part in self.parts]
         friction, spheres = friction_feature(scene.friction), counting_spheres(scene.csd, scene.particles)

@@ -38,7 +38,7 @@ COMMANDS = ["csd", "pack", "predict", "porosity", "permeability", "resistance", 
 ALL_COMMANDS = [*COMMANDS, "export", "rerun"]
 BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
 
-CAKE = {"density_kg_m3": 1180, "friction": 0.1, "adhesion_mJ_m2": 10}
+ESTIMATED = {"density_kg_m3": 1180, "friction": 0.1, "adhesion_mJ_m2": 10}
 NO_DOUBTS: dict[str, list[str]] = {"outside": [], "warnings": []}
 
 Capture = pytest.CaptureFixture[str]
@@ -94,7 +94,7 @@ def test_a_law_of_few_numbers(capsys: Capture) -> None:
 def test_an_estimate_of_a_cake(capsys: Capture) -> None:
     cake = [*PMMA, "--density-kg-m3", "1180", "--friction", "0.1", "--adhesion-mJ-m2", "10"]
     found = as_json(["predict", *cake], capsys)
-    assert found == {**asdict(api.predict(api.distribution(mixture={20: 0.5, 50: 0.5}), **CAKE)), **NO_DOUBTS}
+    assert found == {**asdict(api.predict(api.distribution(mixture={20: 0.5, 50: 0.5}), **ESTIMATED)), **NO_DOUBTS}
     assert main(["predict", *cake]) == 0
     printed = capsys.readouterr()
     assert "mean of many packings" in printed.out and "compressibility n" in printed.out
