@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from filtercake.units import FloatArray
+from filtercake.units import FloatArray, IntArray
 
 JITTER: Final = 1e-9
 """Share of the variance on the diagonal that keeps equal inputs apart."""
@@ -97,7 +97,7 @@ class Process:
         """Logarithm of the probability density of the observations, but for a constant (eq. 5.8 there)."""
         return -0.5 * float(self.outputs @ self._weights) + float(np.sum(np.log(np.diag(self._root))))
 
-    def left_out(self, groups: FloatArray) -> Estimate:
+    def left_out(self, groups: IntArray) -> Estimate:
         """Estimate each observation's truth without the observations of its own group (n,); shapes (n,)."""
         inverse = self._root.T @ self._root
         mean, deviation = np.empty_like(self.outputs), np.empty_like(self.outputs)

@@ -9,7 +9,7 @@ import contextlib
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -69,8 +69,9 @@ LIMIT_MS: Final = 50.0
 BEYOND: Final = {"spread": 0.8, FRICTION: 0.8}
 """Features of which the upper part is left out of a training, and its quantile."""
 
-Say = Callable[[str], None]
 Models = Mapping[str, Emulator]
+Row = Mapping[Any, Any]
+"""Of a table, by column."""
 
 
 def tabulate(folder: Path, listed: Iterable[Member]) -> pd.DataFrame:
@@ -102,7 +103,7 @@ def accepted(table: pd.DataFrame, protocol: str, role: str) -> pd.DataFrame:
     return table[(table["reason"] == "") & (table["protocol"] == protocol) & (table["role"] == role)]
 
 
-def scene_of(row: Mapping[str, Any]) -> Scene:
+def scene_of(row: Row) -> Scene:
     """Make the scene of a row of the table."""
     pairs = [tuple(map(float, pair.split(":"))) for pair in row["mixture"].split(",")]
     size, share = np.array(pairs).T
@@ -123,7 +124,7 @@ def training(rows: pd.DataFrame) -> Training:
         features=np.array([features_of(scene) for scene in scenes]),
         porosity=rows[list(columns)].to_numpy(np.float64),
         spheres=np.array([counting_spheres(scene.csd, scene.particles) for scene in scenes]),
-        group=alike.to_numpy(),
+        group=alike.to_numpy(np.int64),
     )
 
 
@@ -147,14 +148,14 @@ def held_out(models: Models, table: pd.DataFrame, draw: int) -> pd.DataFrame:
         ``HELD_OUT_COLUMNS``; one row per packing and load. One load of each is drawn at random.
     """
     random = np.random.default_rng([draw, 60])
-    rows = [table[table["role"] == HELD_OUT]]
+    rows = table[(table["role"] == HELD_OUT) & (table["reason"] == "")]
     found: list[dict[str, Any]] = []
-    for row in rows[0][rows[0]["reason"] == ""].to_dict("records"):
+    for row in rows.to_dict("records"):
         found += _against(models[row["protocol"]], row, random)
     return pd.DataFrame(found, columns=list(HELD_OUT_COLUMNS))
 
 
-def _against(model: Emulator, row: Mapping[str, Any], random: np.random.Generator) -> list[dict[str, Any]]:
+def _against(model: Emulator, row: Row, random: np.random.Generator) -> list[dict[str, Any]]:
     """Hold a model against one packing, at all of its loads."""
     asked = {name: row[name] for name in HELD_OUT_COLUMNS[:8]}
     try:
@@ -366,9 +367,7 @@ def ensembles(models: Models, means: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _ensemble(
-    models: Models, row: Mapping[str, Any], mixture: Mapping[float, float], attraction: str
-) -> dict[str, Any]:
+def _ensemble(models: Models, row: Row, mixture: Mapping[float, float], attraction: str) -> dict[str, Any]:
     csd = distribution(mixture=dict(mixture)).truncated
     scene = cell_scene(csd, row["friction"], attraction, int(row["spheres"]), 1)
     model = models[FILTRATION_PROTOCOL]

@@ -17,7 +17,7 @@ from filtercake.design.emulator import ADHESION, AT_ONCE, FEATURES, FRICTION, Em
 from filtercake.design.gaussian_process import Covariance, Process, Scatter
 from filtercake.packing.scene import FILTRATION_PROTOCOL
 from filtercake.statistics import CONFIDENCE, quantile
-from filtercake.units import FloatArray
+from filtercake.units import FloatArray, IntArray
 
 SHAPES: Final = 3
 """Shapes that the curves of pressed cakes are added up from."""
@@ -43,7 +43,7 @@ class Training:
     features: FloatArray
     porosity: FloatArray
     spheres: FloatArray
-    group: FloatArray
+    group: IntArray
 
 
 @dataclass(frozen=True, eq=False)

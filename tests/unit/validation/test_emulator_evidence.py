@@ -110,9 +110,7 @@ def synthetic(points: int, noise: float, seed: int = 1) -> Training:
     friction = features[:, FEATURES[GRAVITY_PROTOCOL].index(FRICTION)]
     truth = 0.36 + 0.08 * friction - 0.05 * features[:, 0] + 0.02 * np.sin(3.0 * features[:, 7])
     spheres = np.full(points, 1000.0)
-    return Training(
-        features, (truth + noise * random.normal(size=points))[:, None], spheres, np.arange(points, dtype=np.float64)
-    )
+    return Training(features, (truth + noise * random.normal(size=points))[:, None], spheres, np.arange(points))
 
 
 def test_training_finds_a_known_function_and_its_noise() -> None:
