@@ -124,7 +124,7 @@ def training(rows: pd.DataFrame) -> Training:
         features=np.array([features_of(scene) for scene in scenes]),
         porosity=rows[list(columns)].to_numpy(np.float64),
         spheres=np.array([counting_spheres(scene.csd, scene.particles) for scene in scenes]),
-        group=alike.to_numpy(np.int64),
+        group=np.asarray(alike.to_numpy(), dtype=np.int64),
     )
 
 
