@@ -196,7 +196,10 @@ def test_the_means_of_other_ensembles_are_estimated() -> None:
     means = pd.read_csv(DOCS / "data" / page.MEANS)
     found = evidence.ensembles(shipped(), means)
     assert len(found) == 29
-    assert found["inside"].mean() >= 0.85
+    at_once = np.isinf(found["load"])
+    assert found["inside"][at_once].sum() >= 6
+    # led in another way: docs/pressure.md, "Load over strength decides"
+    assert found["error"][~at_once].abs().max() < 0.0112
 
 
 @pytest.mark.slow
