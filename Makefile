@@ -29,6 +29,8 @@ PERMEABILITY = $(BIN)/python -m filtercake.validation.permeability_page --folder
 	--docs docs --template workflow/report/permeability.md.j2
 PRESSURE = $(BIN)/python -m filtercake.validation.pressure_page --folder results/benchmark/pressure \
 	--docs docs --template workflow/report/pressure.md.j2
+EMULATOR = $(BIN)/python -m filtercake.validation.emulator_page --folder results/benchmark/emulator \
+	--docs docs --template workflow/report/emulator.md.j2 --models src/filtercake/design/emulator.json
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
@@ -48,7 +50,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
 $(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
-.PHONY: run report browser benchmark stability permeability pressure pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement lammps twin leaf-tests synthetic bed-size flow-speed references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability permeability pressure emulator pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement lammps twin leaf-tests synthetic bed-size flow-speed references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -132,16 +134,20 @@ pressure: setup ## ensembles of pressure cells, beds and LIGGGHTS columns, the e
 	$(PRESSURE) --processes $(CORES)
 	$(BIN)/python -m filtercake.validation.figures.protocols --output docs/images/protocols.png
 
+emulator: setup ## the packings that the instant estimate is trained on and held against, its models, docs/emulator.md (about 75 min on 2 cores; goes on where it was stopped)
+	$(EMULATOR) --processes $(CORES)
+
 flow-speed: setup ## time the solver of the flow against copying memory: docs/data/permeability_speed.csv (about 3 min, alone on the machine)
 	$(BIN)/python -m filtercake.validation.flow_speed --output docs/data/permeability_speed.csv
 
-pages: setup ## redraw docs/benchmark.md, docs/stability.md, docs/permeability.md and docs/pressure.md from the tables in docs/data
+pages: setup ## redraw docs/benchmark.md, docs/stability.md, docs/permeability.md, docs/pressure.md and docs/emulator.md (with its models) from the tables in docs/data
 	$(SNAKEMAKE) redraw
 	install -m 644 results/benchmark_redrawn/*.md docs/
 	install -m 644 results/benchmark_redrawn/images/*.png docs/images/
 	install -m 644 results/benchmark_redrawn/*.csv docs/data/
 	$(PERMEABILITY) --redraw
 	$(PRESSURE) --redraw
+	$(EMULATOR) --redraw
 
 faults: setup ## hurt small sweeps in 200 ways (COUNT for another number) and resume them: docs/reliability.md (about 20 min; goes on where it was stopped)
 	@command -v faketime >/dev/null || apt-get install -y -qq --no-install-recommends faketime >/dev/null 2>&1 || \

@@ -167,6 +167,7 @@ COMMANDS = (
     "--slurry-concentration-kg-m3 9",
     "pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --porosity-ci95-target 0.003 --particles 50 --output out/beds",
     "pack config/test/tiny.csv --density-kg-m3 1180 --youngs-modulus-MPa 5 --seed 3 --time-step-us 0.1 --output out/p",
+    "predict --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --friction 0.1 --adhesion-mJ-m2 10 --pressure-kPa 50 --json",
     "resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5 --sphericity 0.9 --json",
     "filter-area --resistance-m-kg 1e8 --slurry-flow-m3-h 20 --slurry-concentration-kg-m3 200 --pressure-drop-kPa 53.3 "
     "--submerged-fraction 0.3 --rotation-rate-rpm 0.2 --medium-resistance-1-m 5e9 --porosity 0.3 --density-kg-m3 2450",

@@ -72,6 +72,11 @@ def test_it_packs(engine: str, environment: Path, tmp_path: Path) -> None:
     assert found["engine"] == engine
 
 
+def test_it_estimates(environment: Path, tmp_path: Path) -> None:
+    found = json.loads(filtercake(environment, tmp_path, "predict --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --json"))
+    assert 0.29 < found["porosity"] < 0.33 and found["packings"] > 100
+
+
 def test_it_has_kinetics_and_a_template(environment: Path, tmp_path: Path) -> None:
     crystallizer = "--kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200"
     assert json.loads(filtercake(environment, tmp_path, f"csd {crystallizer} --json"))["packed_classes"] > 10

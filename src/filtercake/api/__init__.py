@@ -1,9 +1,10 @@
 """The steps of a study as functions: the one import that a notebook needs.
 
-``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`porosity`, :func:`profile`,
-:func:`permeability`, :func:`permeabilities`, :func:`resistance`, :func:`filter_area`, :func:`filtration_test`,
-:func:`filtration_tests`, :func:`crystallizer`, :func:`batch_filter`, :func:`deliquoring`, :func:`cost`, :func:`export`
-and :func:`rerun`. It may import from every room but ``cli``, ``report`` and ``validation``.
+``from filtercake import api``, then :func:`distribution`, :func:`pack`, :func:`predict`, :func:`porosity`,
+:func:`profile`, :func:`permeability`, :func:`permeabilities`, :func:`resistance`, :func:`filter_area`,
+:func:`filtration_test`, :func:`filtration_tests`, :func:`crystallizer`, :func:`batch_filter`, :func:`deliquoring`,
+:func:`cost`, :func:`export` and :func:`rerun`. It may import from every room but ``cli``, ``report`` and
+``validation``.
 
 Each name is imported when it is first asked for: a resistance need not wait for what packings need. So no module here
 may have the name of a function.
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     )
     from filtercake.api.measured import PackingPorosity, porosity, profile
     from filtercake.api.packings import Bed, pack
+    from filtercake.api.predictions import Prediction, PredictOptions, predict
     from filtercake.api.steps import Distribution, Resistance, ResistanceOptions, distribution, resistance
 
 __all__ = [
@@ -57,6 +59,8 @@ __all__ = [
     "PackingPermeability",
     "PackingPorosity",
     "PermeabilityOptions",
+    "PredictOptions",
+    "Prediction",
     "Resistance",
     "ResistanceOptions",
     "batch_filter",
@@ -74,6 +78,7 @@ __all__ = [
     "permeabilities",
     "permeability",
     "porosity",
+    "predict",
     "profile",
     "rerun",
     "resistance",
@@ -103,6 +108,7 @@ _HOMES = {
     ),
     "measured": ("PackingPorosity", "porosity", "profile"),
     "packings": ("Bed", "pack"),
+    "predictions": ("PredictOptions", "Prediction", "predict"),
     "steps": ("Distribution", "Resistance", "ResistanceOptions", "distribution", "resistance"),
 }
 """Names by the module that holds them."""

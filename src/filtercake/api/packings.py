@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -97,12 +97,9 @@ def pack(
     EngineMissing
         If the engine asked for is not installed.
     """
-    material = {name: value for name, value in options.items() if name in Material.model_fields}
-    packing = {name: value for name, value in options.items() if name not in material}
-    if packing.setdefault("protocol", FILTRATION_PROTOCOL) == FILTRATION_PROTOCOL:
-        packing.setdefault("pressure_kPa", PRESSURE)
-        if material.keys().isdisjoint({"adhesion_mJ_m2", "cohesion_kJ_m3"}):
-            material["adhesion_mJ_m2"] = 0.0
+    given = {name: value for name, value in options.items() if name in Material.model_fields}
+    rest = {name: value for name, value in options.items() if name not in given}
+    material, packing = as_packed_by_default(given, rest)
     study = load(source.options, material, packing, law)
     path, name = Path(folder), csd_name(study)
     _check_folder(path)
@@ -126,6 +123,18 @@ def pack(
         failures=tuple(f"r{outcome.replicate}: {outcome.reason}" for outcome in outcomes if outcome.status != "ok"),
         warnings=study.warnings,
     )
+
+
+def as_packed_by_default(
+    material: Mapping[str, Any], packing: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Fill in the blocks ``material`` and ``packing`` where nothing is said: pressed, without attraction."""
+    crystals, made = dict(material), dict(packing)
+    if made.setdefault("protocol", FILTRATION_PROTOCOL) == FILTRATION_PROTOCOL:
+        made.setdefault("pressure_kPa", PRESSURE)
+        if crystals.keys().isdisjoint({"adhesion_mJ_m2", "cohesion_kJ_m3"}):
+            crystals["adhesion_mJ_m2"] = 0.0
+    return crystals, made
 
 
 def _make(point: Point, folder: Path, say: Report) -> list[Outcome]:

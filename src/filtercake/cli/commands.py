@@ -36,6 +36,7 @@ EXAMPLES = {
     "csd": "filtercake csd --kinetics ammonium_alum --residence-time-min 15 --slurry-concentration-kg-m3 200",
     "pack": "filtercake pack --mixture 20:0.5,50:0.5 --density-kg-m3 1180 "
     "--porosity-ci95-target 0.003 --output packing",
+    "predict": "filtercake predict --mixture 20:0.5,50:0.5 --density-kg-m3 1180 --friction 0.1 --adhesion-mJ-m2 10",
     "resistance": "filtercake resistance --porosity 0.36 --density-kg-m3 1180 --mixture 20:0.5,50:0.5",
     "export": "filtercake export pmma pmma_50_s50_mu0_1a2b3c4d --output report",
     "rerun": "filtercake rerun report",
@@ -165,6 +166,11 @@ def _pack_options(parser: words.Parser) -> None:
         "kept. Default: packing",
     )
     parser.add_argument("--replace", action="store_true", help="packings of other options in that folder may be lost")
+
+
+def _predict_options(parser: words.Parser) -> None:
+    words.add_source(parser)
+    words.add_model(parser.add_argument_group("cake"), api.PredictOptions)
 
 
 def _porosity_options(parser: words.Parser) -> None:
@@ -349,6 +355,29 @@ def _run_pack(options: argparse.Namespace) -> int:
     )
     print(f"packings are in {options.output}")
     return status
+
+
+def _run_predict(options: argparse.Namespace) -> int:
+    source = api.distribution(**words.source(options))
+    found = api.predict(source, **words.given(options, api.PredictOptions.model_fields))
+    _say_understood(options, source)
+    for warning in found.warnings:
+        _say(f"warning: {words.with_flags(warning, vars(options))}")
+    for doubt in found.outside:
+        _say(f"warning: outside of what was packed, and so with a wider interval: {doubt}")
+    if options.json:
+        return _print_json(asdict(found))
+    return _print_lines(
+        [
+            ("porosity", found.porosity, f"{_interval(found.porosity_ci95, '')}, mean of many packings"),
+            ("of one packing", found.porosity, _interval(found.porosity_packing_ci95, "")),
+            *_known("porosity at the medium", found.porosity_at_medium),
+            *_known("compressibility n", found.compressibility),
+            *_known("load over strength", found.load_over_strength),
+            *_resistances(asdict(found), _interval(found.resistance_ci95_m_kg, "m/kg")),
+            ("learnt from", found.packings, f"packings by {found.protocol}"),
+        ]
+    )
 
 
 def _known(name: str, value: float | None, unit: str = "") -> list[Line]:
@@ -745,6 +774,12 @@ COMMANDS: dict[str, _Command] = {
         "Pack spheres of a size distribution; print porosity and specific cake resistance (m/kg) with 95 % intervals.",
         _pack_options,
         _run_pack,
+    ),
+    "predict": _Command(
+        "Estimate porosity and specific cake resistance (m/kg) at once, with 95 % intervals, from what a few hundred "
+        "packings were: nothing is packed.",
+        _predict_options,
+        _run_predict,
     ),
     "porosity": _Command(
         "Measure the porosity of packings: in the interior, from the floor, and as the paper counts it.",

@@ -10,11 +10,18 @@ from typing import Any
 
 import pandas as pd
 
+from filtercake.design.emulator import FARTHEST, Emulator
 from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.permeability.measure import SPREAD
 from filtercake.study import limits
 from filtercake.user_files import templates
-from filtercake.validation import pressure_column, pressure_evidence, resistance_law
+from filtercake.validation import (
+    emulator_design,
+    emulator_evidence,
+    pressure_column,
+    pressure_evidence,
+    resistance_law,
+)
 from filtercake.validation.error_against_time import ANALYTIC, DEFAULT, reference_of
 from filtercake.validation.permeability import BED, CELL, LATTICE, LAYERED, known_constant
 from filtercake.validation.pressure import GRAVITY_BED, INVARIANCE, MODULUS, PATH_STRESS, PATHS
@@ -223,6 +230,48 @@ def pressure(template: Path, cells: pd.DataFrame) -> str:
         isostatic=pressure_evidence.contacts_without_stress(means),
         one={row["case"]: row for row in _records(means[means["section"] != PATHS])},
         path_stress=PATH_STRESS,
+    )
+
+
+def emulator(
+    template: Path, packings: pd.DataFrame, means: pd.DataFrame, models: Mapping[str, Emulator], draw: int
+) -> str:
+    """Write the page on the instant estimate.
+
+    Parameters
+    ----------
+    template : Path
+        Its text.
+    packings : DataFrame
+        All packings: :func:`filtercake.validation.emulator_evidence.tabulate`.
+    means : DataFrame
+        Ensembles of pressure cells: :func:`filtercake.validation.pressure_evidence.averages`.
+    models : mapping of str to Emulator
+        Models trained on them, by protocol.
+    draw : int
+        Seed of what is held out.
+    """
+    held = emulator_evidence.held_out(models, packings, draw)
+    drawn = held[held["drawn"].astype(bool)]
+    return _render(
+        template,
+        packings=packings,
+        models=models,
+        wanted=emulator_evidence.WANTED,
+        limit_ms=emulator_evidence.LIMIT_MS,
+        pace=emulator_evidence.pace(packings),
+        farthest=FARTHEST,
+        verdicts=_records(emulator_evidence.verdicts(held)),
+        outside=_records(drawn[drawn["outside"].fillna("") != ""]),
+        missed=_records(drawn[~drawn["inside"].astype(bool)]),
+        by_load={name: _records(emulator_evidence.left_one_out(packings, models[name])) for name in models},
+        ranges={name: emulator_evidence.ranges(models[name]) for name in models},
+        widths={name: emulator_evidence.widths(packings, name) for name in models},
+        learning=_records(emulator_evidence.learning(packings, draw)),
+        beyond=_records(emulator_evidence.beyond(packings)),
+        ensembles=_records(emulator_evidence.ensembles(models, means)),
+        beds=(emulator_design.BED_SAUTER_UM, emulator_design.BED_DENSITY, emulator_design.MOST_STICKY),
+        counts=_records(emulator_evidence.counts(packings)),
     )
 
 

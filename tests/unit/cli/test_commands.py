@@ -8,6 +8,7 @@ import math
 import re
 import shutil
 from collections.abc import Iterator
+from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 
@@ -33,9 +34,12 @@ DRUM = [
     *["--rotation-rate-rpm", "0.2", "--medium-resistance-1-m", "5e9"],
 ]
 DESIGN = ["filter-batch", "deliquor", "crystallizer", "cost"]
-COMMANDS = ["csd", "pack", "porosity", "permeability", "resistance", "filter-area", *DESIGN, "test"]
+COMMANDS = ["csd", "pack", "predict", "porosity", "permeability", "resistance", "filter-area", *DESIGN, "test"]
 ALL_COMMANDS = [*COMMANDS, "export", "rerun"]
 BED = ["--mixture", "30:0.5,50:0.5", "--density-kg-m3", "1180", "--particles", "200", "--engine", "embedded"]
+
+ESTIMATED = {"density_kg_m3": 1180, "friction": 0.1, "adhesion_mJ_m2": 10}
+NO_DOUBTS: dict[str, list[str]] = {"outside": [], "warnings": []}
 
 Capture = pytest.CaptureFixture[str]
 
@@ -85,6 +89,24 @@ def test_a_law_of_few_numbers(capsys: Capture) -> None:
     assert milled["kept_volume_fraction"] == pytest.approx(1.0)
     assert main(["resistance", "--porosity", "0.4", "--density-kg-m3", "1180", "--rosin-rammler", "60,3"]) == 0
     assert "distribution: Rosin-Rammler by volume: d' 60 um" in capsys.readouterr().err
+
+
+def test_an_estimate_of_a_cake(capsys: Capture) -> None:
+    cake = [*PMMA, "--density-kg-m3", "1180", "--friction", "0.1", "--adhesion-mJ-m2", "10"]
+    found = as_json(["predict", *cake], capsys)
+    assert found == {**asdict(api.predict(api.distribution(mixture={20: 0.5, 50: 0.5}), **ESTIMATED)), **NO_DOUBTS}
+    assert main(["predict", *cake]) == 0
+    printed = capsys.readouterr()
+    assert "mean of many packings" in printed.out and "compressibility n" in printed.out
+    assert printed.err == ""
+
+
+def test_an_estimate_outside_of_what_was_packed_says_so(capsys: Capture) -> None:
+    assert main(["predict", *PMMA, "--density-kg-m3", "1180", "--friction", "2"]) == 0
+    assert "warning: outside of what was packed, and so with a wider interval: friction is 2" in capsys.readouterr().err
+    wide = ["--mixture", "1:0.3,1000:0.7", "--density-kg-m3", "1180"]
+    assert "too far off for an estimate; use pack" in complaint(["predict", *wide], capsys)
+    assert "--law = stokes: needs a packing" in complaint(["predict", *PMMA, "--law", "stokes"], capsys)
 
 
 def test_how_a_file_was_read_is_said(capsys: Capture, tmp_path: Path) -> None:

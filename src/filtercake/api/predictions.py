@@ -1,0 +1,214 @@
+"""Porosity and resistance at once, without a packing: what a few hundred packings let expect of another one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from filtercake.api.arguments import ORIGIN
+from filtercake.api.packings import PRESSURE, as_packed_by_default
+from filtercake.api.steps import Distribution, csd_name, load, resistance
+from filtercake.design.emulator_file import shipped
+from filtercake.errors import ConfigError, Problem
+from filtercake.filtration.compressible import CakeAverage, cake_average
+from filtercake.filtration.resistance import CARMAN, law_of
+from filtercake.packing.cloud import NARROW_PARTICLES, cell_for
+from filtercake.packing.compression import CompressionCurve
+from filtercake.packing.engines.embedded import Embedded
+from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene
+from filtercake.results.resistance_columns import ALWAYS
+from filtercake.study import engine_choice
+from filtercake.study.config.values import (
+    TO_NUMBER,
+    Adhesion,
+    Cohesion,
+    CrystalModulus,
+    Density,
+    Friction,
+    LawName,
+    Model,
+    Pressure,
+    Protocol,
+    YoungsModulus,
+)
+from filtercake.study.loading import LoadedStudy
+from filtercake.study.parsing import parse
+from filtercake.study.points import base_point
+
+
+class PredictOptions(Model):
+    """Arguments of :func:`predict`, besides the distribution."""
+
+    protocol: Protocol = Field(
+        default=FILTRATION_PROTOCOL,
+        description="filtration: a cake pressed as in a filter; gravity: spheres that are dropped, as the paper does.",
+    )
+    pressure_kPa: Pressure | None = Field(  # noqa: N815
+        default=None,
+        description=f"Pressure drop across the cake, kPa (protocol: filtration); {PRESSURE:g} if left out.",
+    )
+    friction: Friction = Field(default=0.0, description="Coefficient of friction.")
+    adhesion_mJ_m2: Adhesion | None = Field(  # noqa: N815
+        default=None,
+        description="Work of adhesion of the crystals in the liquid, mJ/m2 (protocol: filtration); none if left out.",
+    )
+    cohesion_kJ_m3: Cohesion | None = Field(  # noqa: N815
+        default=None,
+        description="Cohesion energy density, kJ/m3, instead of the adhesion; 50 if left out with protocol: gravity.",
+    )
+    youngs_modulus_MPa: YoungsModulus = Field(  # noqa: N815
+        default=5.0, description="Young's modulus that goes with the cohesion, MPa."
+    )
+    youngs_modulus_GPa: CrystalModulus = Field(  # noqa: N815
+        default=3.0, description="Young's modulus of the real crystals, GPa (protocol: filtration)."
+    )
+    density_kg_m3: Density | None = Field(
+        default=None, description="Crystal density, kg/m3; that of the crystallizer's kinetics if left out."
+    )
+    sphericity: Annotated[float, Field(ge=0.01, le=1, allow_inf_nan=False), TO_NUMBER] = Field(
+        default=1.0, description="Sphericity in the resistance law; packings are of spheres."
+    )
+    law: LawName = Field(default=CARMAN, description=f"Law of the resistance: {' or '.join(ALWAYS)}.")
+    trust_units: bool = Field(default=False, description="Take density and sizes as they are, however unlikely.")
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What is expected of a cake that was not packed.
+
+    Attributes
+    ----------
+    protocol : str
+        How packings of it would be made.
+    porosity : float
+        Expected mean of many packings; of a pressed cake, that of the even cake with the same resistance.
+    porosity_ci95 : float
+        Half-width of the 95 % interval of that mean. It holds what is not known of the model; not that real crystals
+        are no spheres, nor what friction and attraction were taken for.
+    porosity_packing_ci95 : float
+        Half-width of the 95 % interval of one packing, as large as ``pack`` makes it: its own scatter as well.
+    porosity_at_medium, compressibility : float or None
+        Of a pressed cake: porosity under the whole pressure drop, and exponent n of the average resistance.
+    load_over_strength : float or None
+        Pressure drop over what the contacts hold; None without attraction, and of settled beds.
+    resistance_law : str
+        The law asked for.
+    resistance_m_kg, resistance_ci95_m_kg, resistance_law_ci95_m_kg : float
+        By that law, m/kg; half-widths of its 95 % intervals, from that of the porosity's mean and from the law itself.
+    resistance_additive_m_kg, resistance_carman_m_kg : float
+        By both laws, m/kg.
+    packings : int
+        Packings that the estimate is learnt from.
+    outside : tuple of str
+        Where the cake lies outside of what was packed for it, in words; the intervals are wider there.
+    warnings : tuple of str
+        Doubts about allowed arguments.
+    """
+
+    protocol: str
+    porosity: float
+    porosity_ci95: float
+    porosity_packing_ci95: float
+    porosity_at_medium: float | None
+    compressibility: float | None
+    load_over_strength: float | None
+    resistance_law: str
+    resistance_m_kg: float
+    resistance_ci95_m_kg: float | None
+    resistance_law_ci95_m_kg: float | None
+    resistance_additive_m_kg: float
+    resistance_carman_m_kg: float
+    packings: int
+    outside: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def predict(source: Distribution, **options: Any) -> Prediction:
+    """Estimate porosity and specific resistance of a cake in milliseconds, without a packing.
+
+    Parameters
+    ----------
+    source : Distribution
+        The size distribution; its classes as they would be packed.
+    **options
+        The fields of :class:`PredictOptions`: what :func:`pack` takes of the crystals and the pressure. Everything else
+        is at ``pack``'s defaults.
+
+    Raises
+    ------
+    ConfigError
+        With every problem; also where a cake is too far from all that was packed for an estimate.
+    """
+    given = parse(PredictOptions, options, str(ORIGIN))
+    if law_of(given.law).needs_kozeny_constant:
+        allowed = f"needs a packing to solve the flow in; allowed here: {', '.join(ALWAYS)}"
+        raise ConfigError([Problem(str(ORIGIN), "law", repr(given.law), allowed)])
+    study = _study(source, given)
+    scene = _as_large_as_packed(base_point(study, csd_name(study), engine_choice.choose).scene)
+    model = shipped()[scene.protocol]
+    found = model.estimate(scene)
+    cake = _cake(scene, found.curve)
+    half, packing_half = found.half_widths(lambda curve: _cake(scene, curve).porosity)
+    return Prediction(
+        protocol=scene.protocol,
+        porosity=cake.porosity,
+        porosity_ci95=half,
+        porosity_packing_ci95=packing_half,
+        porosity_at_medium=cake.porosity_at_medium if scene.is_pressed else None,
+        compressibility=cake.exponent if scene.is_pressed else None,
+        load_over_strength=_finite(scene),
+        **_resistances(source, given, scene, (cake.porosity, half)),
+        packings=model.packings,
+        outside=found.outside,
+        warnings=study.warnings,
+    )
+
+
+def _study(source: Distribution, given: PredictOptions) -> LoadedStudy:
+    """Check the study of one point that the packings would be of; no bed is made, so none is too small."""
+    own = {
+        name: value for name, value in given if value is not None and name not in ("protocol", "pressure_kPa", "law")
+    }
+    packing: dict[str, Any] = {"protocol": given.protocol, "engine": Embedded.name}
+    if given.protocol == FILTRATION_PROTOCOL:
+        packing["particles"] = NARROW_PARTICLES
+    if given.pressure_kPa is not None:
+        packing["pressure_kPa"] = given.pressure_kPa
+    material, made = as_packed_by_default(own, packing)
+    return load(source.options, material, made, given.law, packed=False)
+
+
+def _as_large_as_packed(scene: Scene) -> Scene:
+    """Give a pressed cell the spheres that ``pack`` would take, however many."""
+    return replace(scene, particles=cell_for(scene.csd)) if scene.is_pressed else scene
+
+
+def _cake(scene: Scene, curve: CompressionCurve) -> CakeAverage:
+    """Average a pressed cake; a settled bed has one porosity."""
+    return cake_average(scene.load_over_strength if scene.is_pressed else math.inf, curve.at)
+
+
+def _finite(scene: Scene) -> float | None:
+    """Load over strength of a pressed cake with attraction."""
+    known = scene.is_pressed and math.isfinite(scene.load_over_strength)
+    return scene.load_over_strength if known else None
+
+
+def _resistances(
+    source: Distribution, given: PredictOptions, scene: Scene, porosity: tuple[float, float]
+) -> dict[str, Any]:
+    """Resistances by the laws, with the intervals that follow from the porosity's and from the law asked for."""
+    found = resistance(
+        source,
+        porosity=porosity[0],
+        porosity_ci95=porosity[1],
+        density_kg_m3=scene.density,
+        sphericity=given.sphericity,
+        law=given.law,
+        trust_units=given.trust_units,
+    )
+    names = ("resistance_law", "resistance_m_kg", "resistance_ci95_m_kg", "resistance_law_ci95_m_kg")
+    return {name: getattr(found, name) for name in (*names, *(f"resistance_{law}_m_kg" for law in ALWAYS))}
