@@ -61,6 +61,11 @@ def _compresses(points: list[Point]) -> bool:
     return any(point.scene.is_pressed and point.scene.attraction != "none" for point in points)
 
 
+def _rubs(points: list[Point]) -> bool:
+    pressed = [point for point in points if point.scene.is_pressed]
+    return _varies("friction")(pressed) or _varies("adhesion")(pressed)
+
+
 def _pressed(study: Study) -> bool:
     return FILTRATION_PROTOCOL in study.protocols
 
@@ -117,6 +122,7 @@ FIGURES: dict[str, FigureSpec] = {
     "cake_compression": FigureSpec(
         "Porosity and resistance of cakes against pressure", "compression", _compresses, needs=_pressed
     ),
+    "cake_friction": FigureSpec("Porosity and resistance of cakes against friction", "friction", _rubs, needs=_pressed),
     "packing_cross_section": FigureSpec("Cut through a packing", "cross_section"),
     "packing_flow": FigureSpec("Flow through a packing", "flow", needs=_solves_flow),
     "packing_porosity_profile": FigureSpec("Porosity over the height of a bed", "profile", needs=_falls),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,8 @@ import pandas as pd
 import pytest
 
 from filtercake.crystals.csd import mixture
-from filtercake.figures.catalogue import draw
+from filtercake.figures import style
+from filtercake.figures.catalogue import draw, figures_of
 from filtercake.figures.compression import families
 from filtercake.figures.selection import StudyData
 from filtercake.filtration.compressible import cake_average
@@ -21,6 +23,7 @@ from filtercake.report import captions
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
 from filtercake.results.resistance_columns import resistance_columns
 from filtercake.study.config.study import Study
+from filtercake.study.points import expand
 
 CSD = mixture([20e-6, 50e-6], [0.5, 0.5])
 STRENGTH = 0.4  # kPa
@@ -132,3 +135,55 @@ def test_shared_packings_count_once_and_points_are_told_by_what_they_have(data: 
     assert found["made"] == "are pressed from a random cloud as in a filter"
     assert found["lowest"]["where"] == "adhesion 10 mJ/m², friction 0, 10 kPa"
     assert found["highest"]["where"] == "adhesion 10 mJ/m², friction 0, 200 kPa"
+
+
+def rubbing(data: StudyData, frictions: tuple[float, ...], adhesions: tuple[float, ...]) -> StudyData:
+    """Points at 50 kPa of several frictions and adhesions, looser the higher both are."""
+    base = data.replicates[data.replicates["pressure_kPa"] == 50.0]
+    parts = [
+        base.assign(
+            point=f"mu{mu:g}_W{w:g}",
+            friction=mu,
+            adhesion_mJ_m2=w,
+            porosity=base["porosity"] + 0.1 * mu + 0.001 * w,
+            resistance_m_kg=base["resistance_m_kg"] * (1.0 - mu) * (1.0 - 0.01 * w),
+        )
+        for mu in frictions
+        for w in adhesions
+    ]
+    table = pd.concat(parts, ignore_index=True)
+    summary = summarise(table)
+    return dataclasses.replace(data, points=summary, summary=summary, replicates=table)
+
+
+class TestFriction:
+    @pytest.mark.parametrize(
+        ("frictions", "adhesions", "along", "lines"),
+        [
+            ((0.0, 0.1, 0.3), (1.0, 10.0), "friction", 2),
+            ((0.0, 0.1, 0.3), (10.0,), "friction", 1),
+            ((0.0,), (1.0, 10.0), "adhesion_mJ_m2", 1),
+        ],
+    )
+    def test_lines_are_the_table_s(self, data: StudyData, frictions, adhesions, along: str, lines: int) -> None:
+        data = rubbing(data, frictions, adhesions)
+        porosity, resistance = draw("cake_friction", data).axes
+        assert porosity.get_xlabel() == resistance.get_xlabel() == style.AXES[along]
+        for axes, name in ((porosity, "porosity"), (resistance, "resistance_m_kg")):
+            drawn = [container.lines[0].get_ydata() for container in axes.containers]
+            assert len(drawn) == lines
+            for values, (_, rows) in zip(
+                drawn, data.summary.groupby("adhesion_mJ_m2" if along == "friction" else "friction"), strict=True
+            ):
+                np.testing.assert_allclose(values, rows.sort_values(along)[name])
+
+    def test_a_study_that_varies_them_has_the_figure(self, study_from, good_study: str) -> None:
+        head = good_study[: good_study.index("sweeps:")]
+        packing = "packing: {protocol: filtration, pressure_kPa: 50}\n"
+        for block, shown in (
+            ("friction: [0, 0.1]", True),
+            ("adhesion_mJ_m2: [1, 10]", True),
+            ("pressure_kPa: [20, 50]", False),
+        ):
+            study = study_from(f"{head}{packing}sweeps:\n  - {{csd: bimodal, {block}}}\n")
+            assert ("cake_friction" in figures_of(expand(study, lambda *_: "embedded"), study.model)) == shown
