@@ -396,8 +396,8 @@ def test_docstrings_hold_no_example_that_nobody_runs() -> None:
 EXAMPLES = [block for block in blocks(API_PAGE) if block.language == "python"]
 
 
-def test_there_are_four_examples() -> None:
-    assert len(EXAMPLES) == 4
+def test_there_are_five_examples() -> None:
+    assert len(EXAMPLES) == 5
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda block: block.place)
