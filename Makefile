@@ -134,7 +134,7 @@ pressure: setup ## ensembles of pressure cells, beds and LIGGGHTS columns, the e
 	$(PRESSURE) --processes $(CORES)
 	$(BIN)/python -m filtercake.validation.figures.protocols --output docs/images/protocols.png
 
-emulator: setup ## the packings that the instant estimate is trained on and held against, its models, docs/emulator.md (about 75 min on 2 cores; goes on where it was stopped)
+emulator: setup ## the packings that the instant estimate is trained on and held against, its models, docs/emulator.md (about 35 min on 2 cores; goes on where it was stopped)
 	$(EMULATOR) --processes $(CORES)
 
 flow-speed: setup ## time the solver of the flow against copying memory: docs/data/permeability_speed.csv (about 3 min, alone on the machine)

@@ -10,6 +10,7 @@ import json
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -47,6 +48,7 @@ PACKING_COLUMNS: Final = (
     "seed",
     "replicate",
     "particles",
+    "bed_depth_factor",
     "friction",
     "attraction",
     "cohesion_kJ_m3",
@@ -57,7 +59,8 @@ PACKING_COLUMNS: Final = (
     "reason",
 )
 HELD_OUT_COLUMNS: Final = (
-    *("protocol", "family", "particles", "friction", "attraction", "cohesion_kJ_m3", "density_kg_m3", "mixture"),
+    *("protocol", "family", "particles", "bed_depth_factor"),
+    *("friction", "attraction", "cohesion_kJ_m3", "density_kg_m3", "mixture"),
     *("load", "drawn", "porosity", "estimate", "error", "mean_ci95", "packing_ci95", "inside", "outside"),
 )
 """``drawn``: whether this load was drawn to stand for the packing; ``inside``: within the interval of one packing."""
@@ -112,7 +115,9 @@ def scene_of(row: Row) -> Scene:
     if row["protocol"] == FILTRATION_PROTOCOL:
         return cell_scene(csd, friction, row["attraction"], int(row["particles"]), seed)
     material = {"friction": friction, **{name: float(row[name]) for name in ("cohesion_kJ_m3", "density_kg_m3")}}
-    return settled_scene(csd, csd.sauter_mean / MICROMETRE, material, seed)
+    scene = settled_scene(csd, csd.sauter_mean / MICROMETRE, material, seed)
+    # as it was made: the last digits of the sizes may decide how large a bed a distribution is given
+    return replace(scene, particles=int(row["particles"]), bed_depth_factor=float(row["bed_depth_factor"]))
 
 
 def training(rows: pd.DataFrame) -> Training:
@@ -157,7 +162,7 @@ def held_out(models: Models, table: pd.DataFrame, draw: int) -> pd.DataFrame:
 
 def _against(model: Emulator, row: Row, random: np.random.Generator) -> list[dict[str, Any]]:
     """Hold a model against one packing, at all of its loads."""
-    asked = {name: row[name] for name in HELD_OUT_COLUMNS[:8]}
+    asked = {name: row[name] for name in HELD_OUT_COLUMNS[:9]}
     try:
         estimate = model.estimate(scene_of(row))
     except ConfigError as error:

@@ -138,6 +138,13 @@ def test_the_tables_scenes_have_the_designs_features(listed: list[Member], tmp_p
         assert features_of(evidence.scene_of(row)) == pytest.approx(features_of(member.scene), rel=1e-4, abs=1e-5)
 
 
+def test_a_bed_is_that_which_was_made_whatever_the_last_digit_of_a_size() -> None:
+    row = {"protocol": GRAVITY_PROTOCOL, "friction": 0.0, "cohesion_kJ_m3": 50.0, "density_kg_m3": 1180.0, "seed": 1}
+    wide = {**row, "mixture": "10:0.5,40.00001:0.5", "particles": 2837, "bed_depth_factor": 2.174}
+    rounded = {**wide, "mixture": "10:0.5,40:0.5"}
+    assert features_of(evidence.scene_of(rounded)) == pytest.approx(features_of(evidence.scene_of(wide)), abs=1e-4)
+
+
 def _stored(folder: Path, member: Member) -> Path:
     """Store a packing that was never made."""
     loads = len(LOADS) if member.scene.is_pressed and member.scene.attraction != "none" else 1
