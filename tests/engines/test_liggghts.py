@@ -646,7 +646,7 @@ def test_a_missing_engine_is_no_outcome(
     monkeypatch.setenv("FILTERCAKE_LIGGGHTS", "/no/such/liggghts")
     with pytest.raises(EngineMissing, match="LIGGGHTS is not at /no/such/liggghts"):
         pack_replicates(scene, 1, tmp_path, "code")
-    with pytest.raises(EngineMissing, match="engine 'lammps' is not known; choose one of liggghts"):
+    with pytest.raises(EngineMissing, match="engine 'lammps' is not known; choose one of embedded, liggghts"):
         get_engine("lammps")
 
 

@@ -67,7 +67,7 @@ def test_calibrate_says_what_to_give(checkout: Checkout) -> None:
     done = checkout.snakemake("--dry-run", "calibrate")
     output = done.stdout + done.stderr
     assert done.returncode != 0 and "most recent call last" not in output
-    assert "no calibration is asked for" in output and "allowed: pmma, pmma_paper, synthetic" in output
+    assert "no calibration is asked for" in output and "allowed: pmma, pmma_filtration, pmma_paper, synthetic" in output
 
 
 def test_both_engines_make_the_same_points() -> None:

@@ -54,7 +54,7 @@ def test_spoiled_packings_are_rows_with_reasons(checkout):
     spoiler.write_text(SPOILER.format(real=real))
     spoiler.chmod(spoiler.stat().st_mode | stat.S_IXUSR)
     text = (checkout.root / "config/test/tiny.yaml").read_text()
-    text = text.partition("sweeps:")[0].replace("replicates: 2", "replicates: 1")
+    text = text.partition("sweeps:")[0].replace("replicates: 2", "replicates: 1\n  engine: liggghts")
     text += "sweeps:\n  - csd: bimodal\n    cohesion_kJ_m3: [1, 2, 3, 4, 5, 50]\n"
     (checkout.root / "config/test/spoiled.yaml").write_text(text)
     table = "results/spoiled/summary.csv"

@@ -40,7 +40,7 @@ def test_leaves_tables_figures_and_provenance(finished):
     assert (
         drawn
         == set(FIGURES)
-        - {"sensitivity_poisson_restitution", "packing_flow", "cake_compression"}
+        - {"sensitivity_poisson_restitution", "packing_flow", "cake_compression", "cake_friction"}
         - made_by_a_crystallizer
     )
     assert all(path.with_suffix(".pdf").stat().st_size > 1000 for path in (finished.results / "figures").glob("*.png"))

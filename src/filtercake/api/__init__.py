@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     )
     from filtercake.api.measured import PackingPorosity, porosity, profile
     from filtercake.api.packings import Bed, pack
-    from filtercake.api.predictions import Prediction, PredictOptions, predict
+    from filtercake.api.predict_options import PredictOptions
+    from filtercake.api.predictions import Prediction, predict
     from filtercake.api.steps import Distribution, Resistance, ResistanceOptions, distribution, resistance
 
 __all__ = [
@@ -108,7 +109,8 @@ _HOMES = {
     ),
     "measured": ("PackingPorosity", "porosity", "profile"),
     "packings": ("Bed", "pack"),
-    "predictions": ("PredictOptions", "Prediction", "predict"),
+    "predict_options": ("PredictOptions",),
+    "predictions": ("Prediction", "predict"),
     "steps": ("Distribution", "Resistance", "ResistanceOptions", "distribution", "resistance"),
 }
 """Names by the module that holds them."""

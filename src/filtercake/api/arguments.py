@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+PRESSURE = 50.0
+"""Pressure drop across a cake where none is given, kPa: a vacuum filter's."""
 ORIGIN = Path("options")
 """Stands for the study file in messages about arguments; files that arguments name are looked up from here."""
 SOURCES = ("mixture", "file", "lognormal", "rosin_rammler", "kinetics")

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-from filtercake.api.arguments import ORIGIN
+from filtercake.api.arguments import ORIGIN, PRESSURE
 from filtercake.api.steps import Distribution, csd_name, load, resistance
 from filtercake.errors import ConfigError, PackingRejected, Problem
 from filtercake.filtration.resistance import CARMAN
@@ -27,8 +27,6 @@ from filtercake.study.points import Point, base_point
 from filtercake.units import MICROSECOND
 
 SUMMARY = "summary.json"
-PRESSURE = 50.0
-"""Pressure drop across a cake where none is given, kPa: a vacuum filter's."""
 _OWN = re.compile(rf"r\d+\..*|\.r\d+\..*|\.work|{re.escape(MANIFEST)}|{re.escape(SUMMARY)}")
 """Names that packings and their records have."""
 

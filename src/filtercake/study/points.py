@@ -197,11 +197,11 @@ def base_rows(study: Study, table: pd.DataFrame, free: Collection[str] = ()) -> 
 
 def _of_own_engine(study: Study, table: pd.DataFrame) -> NDArray[np.bool_]:
     """Rows by the study's own engine; by the first of the table, where its own packed nothing. One presses cakes."""
-    made = table["engine"].astype(str)
+    made, pressed = table["engine"].astype(str), table["protocol"] == FILTRATION_PROTOCOL
     own = Embedded.name if study.packing.engine == AUTO else study.packing.engine
-    if len(table) and own not in set(made):
-        own = made.iloc[0]
-    pressed = table["protocol"] == FILTRATION_PROTOCOL
+    beds = made[~pressed]
+    if len(beds) and own not in set(beds):
+        own = beds.iloc[0]
     return np.asarray((made == own) | pressed, dtype=bool)
 
 

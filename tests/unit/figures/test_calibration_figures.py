@@ -219,7 +219,7 @@ class TestCatalogue:
         assert set(figures_of_calibration(False, measurements)) == set(CALIBRATION_FIGURES) - {
             "calibration_predictions"
         }
-        assert of_tests == ["filtration_fits", "compressibility"]
+        assert of_tests == {"filtration_fits", "compressibility"}
 
     def test_every_figure_has_its_module(self) -> None:
         folder = Path(style.__file__).parent

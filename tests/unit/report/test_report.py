@@ -217,7 +217,7 @@ def test_every_figure_of_a_calibration_has_a_caption_with_n_and_engine(
     figure: str, calibration: CalibrationData, tmp_path: Path
 ) -> None:
     caption, front = written(tmp_path, figure, captions.calibration_values(calibration))
-    value = with_interval(*calibration.cohesion)
+    value = with_interval(*calibration.found)
     good = int((calibration.simulated["status"] == "ok").sum())
     for text in (caption, front):
         assert f"n = {good} packings" in text and "engine" in text and value in text
