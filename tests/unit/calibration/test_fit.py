@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from filtercake.calibration.fit import (
     Calibration,
@@ -443,6 +444,26 @@ class TestCakesOfOneDistribution:
         residual = np.array([0.2 - fit.best[0], 0.2 - fit.best[0]]) * -1.0 + np.array([0.0, 0.03])
         assert fit.chi_square == pytest.approx(residual @ np.linalg.solve(covariance, residual), rel=1e-3)
         assert fit.degrees_of_freedom == 1
+
+    def test_the_deviance_is_minus_twice_the_ln_of_the_likelihood(self) -> None:
+        """With variances that change along the friction, the determinant of the covariance takes part."""
+
+        class Widening(Curve):
+            def __call__(self, points):
+                mean, variance = super().__call__(points)
+                return mean, variance * (1.0 + 20.0 * np.atleast_2d(points)[:, 0])
+
+        observations = [Observation(f"{p:g}", "a", -0.2, 0.02, p) for p in (20.0, 200.0)]
+        responses = {item.cake: Widening((self.MU,), lambda mu: -1.0 * mu, 0.05) for item in observations}
+        fit = calibrate(observations, responses, 0.6)
+
+        def minus_twice_ln(mu: float) -> float:
+            covariance = 0.05**2 * (1.0 + 20.0 * mu) * np.array([[1.0, 0.6], [0.6, 1.0]]) + 0.02**2 * np.eye(2)
+            return -2.0 * float(multivariate_normal.logpdf([-0.2, -0.2], [-mu, -mu], covariance))
+
+        (axis,) = fit.axes
+        expected = np.array([minus_twice_ln(mu) for mu in axis[::40]])
+        assert np.ptp(fit.deviance[::40] - expected) < 1e-6
 
     def test_a_wrong_compressibility_is_a_misfit_with_a_discrepancy(self) -> None:
         """Errors shared by both pressures do not hide that the measured resistance rises faster."""

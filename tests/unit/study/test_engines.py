@@ -116,6 +116,17 @@ class TestCrossCheck:
         # there are no more packings than the study has
         assert sum(other.replicates for _, other in drawn(self.study(study_from, good_study, 100), points)) == 12
 
+    def test_no_point_is_drawn_more_often_than_it_has_packings(
+        self, study_from: Callable[..., Any], good_study: str
+    ) -> None:
+        sweeps = (
+            "sweeps:\n  - {csd: bimodal, cohesion_kJ_m3: 0, replicates: 1}\n"
+            "  - {csd: bimodal, cohesion_kJ_m3: 50, replicates: 4}\n"
+        )
+        study = study_from(f"{_with_sweeps(good_study, sweeps)}cross_check: {{engine: liggghts, packings: 4}}\n")
+        counts = {own.scene.cohesion: other.replicates for own, other in drawn(study, expand(study, choose))}
+        assert counts == {0.0: 1, 50e3: 3}
+
     def test_a_missing_engine_checks_nothing_and_says_so(
         self, nowhere: Path, study_from: Callable[..., Any], good_study: str
     ) -> None:
