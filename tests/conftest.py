@@ -167,6 +167,16 @@ def study_from(write_study: Callable[..., Path]) -> Callable[..., LoadedStudy]:
 
 
 @pytest.fixture
+def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """No program at all is on the PATH."""
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    monkeypatch.setenv("PATH", str(empty))
+    monkeypatch.delenv("FILTERCAKE_LIGGGHTS", raising=False)
+    return empty
+
+
+@pytest.fixture
 def good_study() -> str:
     """Text of a small good study, to be broken by a test."""
     return STUDY

@@ -692,16 +692,6 @@ def test_a_benchmark_may_be_asked_for_by_its_path(write_study, tmp_path: Path) -
 # --- a missing engine ----------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """No program at all is on the PATH."""
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    monkeypatch.setenv("PATH", str(empty))
-    monkeypatch.delenv("FILTERCAKE_LIGGGHTS", raising=False)
-    return empty
-
-
 @pytest.mark.parametrize("engine", ["liggghts", "liggghts_as_published"])
 def test_a_missing_engine_is_named_with_the_way_to_get_it(
     nowhere: Path, study_from: Callable[..., Any], good_study: str, engine: str

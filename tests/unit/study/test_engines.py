@@ -19,16 +19,6 @@ from filtercake.study.engine_choice import choose
 from filtercake.study.points import base_rows, expand, points_table
 
 
-@pytest.fixture
-def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """No program at all is on the PATH."""
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    monkeypatch.setenv("PATH", str(empty))
-    monkeypatch.delenv("FILTERCAKE_LIGGGHTS", raising=False)
-    return empty
-
-
 def _with_sweeps(study: str, sweeps: str) -> str:
     return study[: study.index("sweeps:")] + sweeps
 
