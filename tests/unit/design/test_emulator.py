@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filtercake.crystals.csd import CrystalSizeDistribution
-from filtercake.design import emulator_file
+from filtercake.design import emulator, emulator_file
 from filtercake.design.emulator import FARTHEST, FEATURES, MEANINGS, CurveEstimate, Emulator, features_of
 from filtercake.design.emulator_file import MODELS, read, shipped, write
 from filtercake.design.packing_features import SHAPE_FEATURES, counting_spheres, friction_feature, shape_features
@@ -154,6 +154,14 @@ def test_the_interval_widens_steadily_outside() -> None:
             widths.append(math.inf)
     assert widths == sorted(widths)
     assert widths[-1] == math.inf
+
+
+def test_beyond_the_process_s_own_doubt_the_interval_widens_by_the_distance(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = half_widths(pressed(bimodal(), 1.6))[0]
+    inside = half_widths(pressed(bimodal(), 0.3))[0]
+    monkeypatch.setattr(emulator, "WIDENING", 0.0)
+    assert np.all(wide > 1.05 * half_widths(pressed(bimodal(), 1.6))[0])
+    np.testing.assert_allclose(half_widths(pressed(bimodal(), 0.3))[0], inside)
 
 
 def test_too_far_outside_is_refused_with_the_feature_its_value_and_range() -> None:

@@ -177,6 +177,16 @@ class TestFriction:
             ):
                 np.testing.assert_allclose(values, rows.sort_values(along)[name])
 
+    def test_without_a_pressure_of_its_own_a_study_s_first_is_shown(self, data: StudyData) -> None:
+        both = rubbing(data, (0.0, 0.1), (10.0,))
+        other = both.summary.assign(point=both.summary["point"] + "_p", pressure_kPa=200.0, porosity=0.9)
+        packing = both.study.packing.model_copy(update={"pressure_kPa": None})
+        study = both.study.model_copy(update={"packing": packing})
+        both = dataclasses.replace(both, study=study, summary=pd.concat([both.summary, other], ignore_index=True))
+        porosity, _ = draw("cake_friction", both).axes
+        (drawn,) = porosity.containers
+        assert len(drawn.lines[0].get_ydata()) == 2 and max(drawn.lines[0].get_ydata()) < 0.5
+
     def test_a_study_that_varies_them_has_the_figure(self, study_from, good_study: str) -> None:
         head = good_study[: good_study.index("sweeps:")]
         packing = "packing: {protocol: filtration, pressure_kPa: 50}\n"

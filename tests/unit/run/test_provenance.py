@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy
 import pytest
 
+from filtercake.packing.engines import ENGINES
+from filtercake.packing.engines.liggghts import TEMPLATE_FOLDER_VARIABLE, template_folder
 from filtercake.run import provenance
-from filtercake.run.provenance import ROOT, code_hash, describe, packing_sources, sources, versions
+from filtercake.run.provenance import ROOT, code_hash, describe, packing_code, packing_sources, sources, versions
 
 
 def names(module: str) -> set[str]:
@@ -229,3 +231,13 @@ def test_a_file_behind_many_modules_is_read_once(library: Path) -> None:
     for module in ("top", "middle", "beside", "inner.ground"):
         sources(module)
     assert provenance._imports.cache_info().misses == 7  # every file once
+
+
+def test_a_deck_counts_for_the_engine_that_fills_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    folder = tmp_path / "templates"
+    shutil.copytree(template_folder(), folder)
+    monkeypatch.setenv(TEMPLATE_FOLDER_VARIABLE, str(folder))
+    before = {name: packing_code(name) for name in ENGINES}
+    deck = folder / "packing.in.j2"
+    deck.write_text(f"{deck.read_text()}\n# edited\n")
+    assert {name for name in ENGINES if packing_code(name) != before[name]} == {"liggghts"}
