@@ -260,7 +260,7 @@ class CellBox:
         first, last = np.empty(size, dtype=np.uint64), np.empty(size, dtype=np.uint64)
         while True:
             neighbour = np.empty(self.room, dtype=np.uint32)
-            pairs = _pairs(first, last, neighbour, neighbour, False)
+            pairs = _pairs(first, last, neighbour, False)
             count = self.find_pairs(rows, grid, pairs)
             if count < self.room:
                 counts = (last - first).astype(np.int64)
@@ -303,13 +303,11 @@ class CellBox:
         layers = (1, rows.size, 3)
         self.motion = cell_kernels.Motion(self.velocity, self.drag, owner, shift, self.box)
         self.bodies = kernels.Bodies(self.spheres[rows], self.spin[rows], np.zeros(layers), np.zeros(layers))
-        first_of_pair = np.repeat(np.arange(first.size, dtype=np.uint32), (last - first).astype(np.int64))
-        self.pairs = _pairs(first, last, first_of_pair, neighbour, self.frictional)
+        self.pairs = _pairs(first, last, neighbour, self.frictional)
         if spring is not None:
             self.pairs.spring[...] = spring
         damping_ratio = contact_law.damping_ratio(self.scene.restitution)
         self.pair_constants(self.bodies.state, self.pairs, self.scene.modulus, damping_ratio)
-        self.pairs.near_constants[:, : neighbour.size] = self.pairs.constants.T
 
 
 def _wrapped(position: FloatArray, sides: FloatArray) -> FloatArray:
@@ -343,24 +341,21 @@ def _law(scene: CellScene) -> kernels.Law:
 
 
 def _pairs(
-    first: kernels.Unsigned,
-    last: kernels.Unsigned,
-    owner: kernels.Neighbours,
-    neighbour: kernels.Neighbours,
-    frictional: bool,
+    first: kernels.Unsigned, last: kernels.Unsigned, neighbour: kernels.Neighbours, frictional: bool
 ) -> kernels.Pairs:
-    """Make a pair list; all pairs count as near ones."""
+    """Make a pair list with room for its near ones."""
+    size = neighbour.size
     return kernels.Pairs(
         bounds=np.array([0, first.size]),
         halo=np.zeros((1, 2), dtype=np.int64),
         first=first,
         last=last,
         neighbour=neighbour,
-        constants=np.empty((neighbour.size, 2)),
-        spring=np.zeros((max(neighbour.size, 1) if frictional else 1, 3)),
-        near_end=last[-1:].copy(),
-        near_owner=owner,
-        near_neighbour=neighbour,
-        near_constants=np.empty((2, neighbour.size + pair_kernels.VECTOR)),
-        near_pair=np.arange(neighbour.size, dtype=np.uint32),
+        constants=np.empty((size, 2)),
+        spring=np.zeros((max(size, 1) if frictional else 1, 3)),
+        near_end=np.zeros(1, dtype=np.uint64),
+        near_owner=np.empty(size, dtype=np.uint32),
+        near_neighbour=np.empty(size, dtype=np.uint32),
+        near_constants=np.empty((2, size + pair_kernels.VECTOR)),
+        near_pair=np.empty(size, dtype=np.uint32),
     )

@@ -89,6 +89,8 @@ class Averages(NamedTuple):
     overlap: float
 
 
+SPEED_ROOM = 1.5
+"""Limit of the speeds while a choice of near pairs lasts, over the largest speed at its beginning."""
 LEAST_ROOM = 0.1
 """Share of the skin that is kept for the step in which its end is noticed."""
 
@@ -196,6 +198,15 @@ def room_left(state: FloatArray, sides: FloatArray, reach: Reach) -> float:
     return scale * reach.skin - max(1.0 - scale, 0.0) * reach.widest - 2.0 * math.sqrt(farthest)
 
 
+@_compiled
+def _fastest(velocity: FloatArray) -> float:
+    """Return the largest speed in the box, m/s."""
+    fastest = 0.0
+    for i in range(velocity.shape[0]):
+        fastest = max(fastest, velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2)
+    return math.sqrt(fastest)
+
+
 @cache
 def make_advance(attraction: int, frictional: bool, uniaxial: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
@@ -218,9 +229,18 @@ def make_advance(attraction: int, frictional: bool, uniaxial: bool) -> Callable[
         Real distances are taken only when the sum of the largest speeds says so.
         """
         time_step, box = law.time_step, motion.box
-        room = 0.0
+        strained = 0.5 * servo.fastest * (reach.widest + reach.skin)  # by what the box alone brings a sphere nearer
+        count = (bodies.state.shape[0] + kernels.PATCH - 1) // kernels.PATCH
+        patches = kernels.Patches(np.zeros(count), np.zeros(count))
+        speed = _fastest(motion.velocity)
+        room, limit, picked = 0.0, 0.0, 0
         for done in range(steps):
             place_images(bodies, motion, frictional)
+            if picked == 0 or speed > limit:
+                picked, limit = kernels.NEAR_STEPS, SPEED_ROOM * speed
+                patches.limit[:] = limit + strained
+                kernels.pick_near(0, bodies.state, pairs, patches, law)
+            picked -= 1
             _clear(bodies, frictional)
             pair_kernels.pair_forces(0, bodies, pairs, law, time_step, attraction, frictional)
             volume = box[0, 0] * (box[0, 1] * box[0, 2])

@@ -521,7 +521,7 @@ def _within_room(state: FloatArray, patches: Patches, listing: Listing, since: i
 
 
 @_compiled
-def _pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law: Law) -> None:
+def pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law: Law) -> None:
     """Copy those of one part's pairs that may touch within ``NEAR_STEPS`` to the near ones."""
     first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
     near_owner, near_neighbour = pairs.near_owner, pairs.near_neighbour
@@ -729,7 +729,7 @@ def make_advance(attraction: int, frictional: bool, threaded: bool) -> Callable[
                     if not _within_room(state, patches, listing, since, time_step):
                         return done, ready
                     for t in prange(parts):
-                        _pick_near(t, state, pairs, patches, law)
+                        pick_near(t, state, pairs, patches, law)
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
                     pair_kernels.pair_forces(t, bodies, pairs, law, spring_step, attraction, frictional)

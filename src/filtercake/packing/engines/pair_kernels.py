@@ -191,49 +191,62 @@ def _tangential(count: int, law: Law, spring_step: float, rows: FloatArray) -> N
 @_compiled
 def _give_push(part: int, begin: int, end: int, bodies: Bodies, pairs: Pairs, rows: FloatArray) -> None:
     """Add the forces to both spheres: to the total, or, of another part's sphere, to the layer of this part."""
-    force = bodies.force
+    force, layer = bodies.force[0], bodies.force[min(part + 1, bodies.force.shape[0] - 1)]
+    alone = bodies.force.shape[0] == 1  # then the images of a cell are its own, too
     lower, upper = np.uint64(pairs.bounds[part]), np.uint64(pairs.bounds[part + 1])
-    own, other = np.uint64(0), np.uint64(part + 1)
     c = np.uint64(0)
     for p in range(begin, end):
         i, j = pairs.near_owner[p], pairs.near_neighbour[p] & INDEX_MASK
-        layer = own if lower <= j < upper else other
         push = rows[_PUSH + c]
         gx, gy, gz = push * rows[_DX + c], push * rows[_DY + c], push * rows[_DZ + c]
-        force[own, i, 0] += gx
-        force[own, i, 1] += gy
-        force[own, i, 2] += gz
-        force[layer, j, 0] -= gx
-        force[layer, j, 1] -= gy
-        force[layer, j, 2] -= gz
+        force[i, 0] += gx
+        force[i, 1] += gy
+        force[i, 2] += gz
+        if alone or lower <= j < upper:
+            force[j, 0] -= gx
+            force[j, 1] -= gy
+            force[j, 2] -= gz
+        else:
+            layer[j, 0] -= gx
+            layer[j, 1] -= gy
+            layer[j, 2] -= gz
         c += np.uint64(1)
 
 
 @_compiled
 def _give_turning(part: int, begin: int, end: int, bodies: Bodies, pairs: Pairs, rows: FloatArray) -> None:
     """As above with torques, and keep the springs."""
-    force, torque, spring = bodies.force, bodies.torque, pairs.spring
+    other = min(part + 1, bodies.force.shape[0] - 1)
+    alone = bodies.force.shape[0] == 1
+    force, torque = bodies.force[0], bodies.torque[0]
+    force_layer, torque_layer, spring = bodies.force[other], bodies.torque[other], pairs.spring
     lower, upper = np.uint64(pairs.bounds[part]), np.uint64(pairs.bounds[part + 1])
-    own, other = np.uint64(0), np.uint64(part + 1)
     c = np.uint64(0)
     for p in range(begin, end):
         i, j, pair = pairs.near_owner[p], pairs.near_neighbour[p] & INDEX_MASK, pairs.near_pair[p]
-        layer = own if lower <= j < upper else other
         gx, gy, gz = rows[_FX + c], rows[_FY + c], rows[_FZ + c]
         mx, my, mz = rows[_MX + c], rows[_MY + c], rows[_MZ + c]
         arm, other_arm = rows[_ARM + c], rows[_OTHER_ARM + c]
-        force[own, i, 0] += gx
-        force[own, i, 1] += gy
-        force[own, i, 2] += gz
-        torque[own, i, 0] -= arm * mx
-        torque[own, i, 1] -= arm * my
-        torque[own, i, 2] -= arm * mz
-        force[layer, j, 0] -= gx
-        force[layer, j, 1] -= gy
-        force[layer, j, 2] -= gz
-        torque[layer, j, 0] -= other_arm * mx
-        torque[layer, j, 1] -= other_arm * my
-        torque[layer, j, 2] -= other_arm * mz
+        force[i, 0] += gx
+        force[i, 1] += gy
+        force[i, 2] += gz
+        torque[i, 0] -= arm * mx
+        torque[i, 1] -= arm * my
+        torque[i, 2] -= arm * mz
+        if alone or lower <= j < upper:
+            force[j, 0] -= gx
+            force[j, 1] -= gy
+            force[j, 2] -= gz
+            torque[j, 0] -= other_arm * mx
+            torque[j, 1] -= other_arm * my
+            torque[j, 2] -= other_arm * mz
+        else:
+            force_layer[j, 0] -= gx
+            force_layer[j, 1] -= gy
+            force_layer[j, 2] -= gz
+            torque_layer[j, 0] -= other_arm * mx
+            torque_layer[j, 1] -= other_arm * my
+            torque_layer[j, 2] -= other_arm * mz
         spring[pair, 0], spring[pair, 1], spring[pair, 2] = rows[_NEW_X + c], rows[_NEW_Y + c], rows[_NEW_Z + c]
         c += np.uint64(1)
 
