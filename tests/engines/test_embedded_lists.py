@@ -85,7 +85,8 @@ def test_a_bullet_through_a_cloud_at_rest_meets_what_it_meets(speed, seed, size)
     velocity = np.zeros_like(position)
     velocity[-1] = [0.3 * speed, 0.1 * speed, speed]
     scene = scene_of(CrystalSizeDistribution.from_classes([10e-6], [1.0]), 301)
-    bed = Bed(position + [0.0, 0.0, 500e-6], velocity, np.append(cloud.radius, 0.5 * size), cloud.length, scene, 0.0)
+    position[:, 2] += 500e-6
+    bed = Bed(position, velocity, np.append(cloud.radius, 0.5 * size), cloud.length, scene, 0.0)
     for _ in range(25):
         bed.advance(37)
         assert touching(bed) <= near(bed)
