@@ -235,6 +235,23 @@ SPEED = {
         "skin_um": 10,
         "steps": 120_000,
     },
+    # against another engine of today, from the same clouds; LAMMPS knows no such cohesion
+    "pmma_without_cohesion": {
+        "study": str(ROOT / "config" / "studies" / "pmma.yaml"),
+        "csd": "pmma_50_50",
+        "cohesion_kJ_m3": 0,
+        "engines": ["lammps", "liggghts", "embedded"],
+        "replicates": 3,
+        "processes": 1,
+    },
+    "alum_without_cohesion": {
+        "study": str(ROOT / "config" / "benchmarks" / "agreement_alum.yaml"),
+        "csd": "alum_15min",
+        "cohesion_kJ_m3": 0,
+        "engines": ["lammps", "liggghts", "embedded"],
+        "replicates": 1,
+        "processes": 1,
+    },
     "alum_full": {
         "study": str(ROOT / "config" / "benchmarks" / "agreement_alum.yaml"),
         "csd": "alum_15min",
