@@ -125,7 +125,7 @@ benchmark: setup ## run time against error: docs/benchmark.md (about 30 min on 2
 	$(SNAKEMAKE) benchmark $(if $(QUICK),--config quick=true)
 	$(if $(QUICK),,install -m 644 results/benchmark/benchmark.md docs/)
 	$(if $(QUICK),,install -m 644 results/benchmark/images/run_time_error.png docs/images/)
-	$(if $(QUICK),,install -m 644 results/benchmark/run_time_error.csv results/benchmark/choices.csv results/benchmark/coverage.csv docs/data/)
+	$(if $(QUICK),,install -m 644 results/benchmark/run_time_error.csv results/benchmark/choices.csv results/benchmark/coverage.csv results/benchmark/answers.csv docs/data/)
 
 stability: setup ## stress tests of both engines: docs/stability.md (about 30 min on 2 cores; QUICK=1 as above)
 	$(SNAKEMAKE) stability $(if $(QUICK),--config quick=true)
