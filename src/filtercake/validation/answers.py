@@ -29,8 +29,15 @@ ESTIMATED: Final = "instant estimate"
 ACCURACY: Final = 0.02
 """Relative accuracy of the solved flow."""
 PRESSURE_KPA: Final = 50.0
-SLURRY: Final[Mapping[str, float]] = {"slurry_concentration_kg_m3": 150.0, "slurry_flow_m3_h": 15.0}
-"""What the drum filter takes; all else of it is at the defaults."""
+SLURRY: Final[Mapping[str, float]] = {
+    "slurry_concentration_kg_m3": 150.0,
+    "slurry_flow_m3_h": 15.0,
+    "pressure_drop_kPa": PRESSURE_KPA,
+    "submerged_fraction": 0.3,
+    "rotation_rate_rpm": 0.2,
+    "medium_resistance_1_m": 5e9,
+}
+"""The paper's drum filter at this pressure, and what it takes."""
 MATERIAL: Final[Mapping[str, Any]] = {"density_kg_m3": 1180.0, "youngs_modulus_GPa": 3.0, "adhesion_mJ_m2": 10.0}
 SETTLED: Final[Mapping[str, Any]] = {"density_kg_m3": 1180.0, "cohesion_kJ_m3": 50.0}
 """The crystals as a filter presses them, and as the paper lets them settle."""

@@ -64,8 +64,8 @@ def benchmark(
     The tables are those of :func:`filtercake.validation.error_against_time.errors` (all cases, with ``on_front``),
     :func:`reference_table`, :func:`~filtercake.validation.error_against_time.choice_table`,
     :func:`~filtercake.validation.error_against_time.coverage` and
-    :func:`~filtercake.validation.answers.answers` (with the column friction); ``data`` is the folder of the committed results of long
-    computations, whose tables the page shows too.
+    :func:`~filtercake.validation.answers.answers` (with the column friction); ``data`` is the folder of the committed
+    results of long computations, whose tables the page shows too.
     """
     stored = [path for path in sorted(data.glob("*.csv")) if "replicates" not in path.stem]
     tables = {path.stem: _records(pd.read_csv(path)) for path in stored}
