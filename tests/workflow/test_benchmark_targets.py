@@ -17,7 +17,7 @@ JOBS = {
     "speed": ["time_in_turn"],
     "growth": ["time_growth"],
     "reference": ["gather_references"],
-    "benchmark": ["time_variants", "choices", "coverage", "benchmark_page"],
+    "benchmark": ["time_variants", "choices", "answers", "coverage", "benchmark_page"],
     "stability": ["stress", "stability_page"],
     "twin": ["repeat_calibrations", "calibrate_apart"],
     "bed_size": ["compare_sizes"],

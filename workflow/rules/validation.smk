@@ -235,6 +235,23 @@ SPEED = {
         "skin_um": 10,
         "steps": 120_000,
     },
+    # against another engine of today, from the same clouds; LAMMPS knows no such cohesion
+    "pmma_without_cohesion": {
+        "study": str(ROOT / "config" / "studies" / "pmma.yaml"),
+        "csd": "pmma_50_50",
+        "cohesion_kJ_m3": 0,
+        "engines": ["lammps", "liggghts", "embedded"],
+        "replicates": 3,
+        "processes": 1,
+    },
+    "alum_without_cohesion": {
+        "study": str(ROOT / "config" / "benchmarks" / "agreement_alum.yaml"),
+        "csd": "alum_15min",
+        "cohesion_kJ_m3": 0,
+        "engines": ["lammps", "liggghts", "embedded"],
+        "replicates": 1,
+        "processes": 1,
+    },
     "alum_full": {
         "study": str(ROOT / "config" / "benchmarks" / "agreement_alum.yaml"),
         "csd": "alum_15min",
@@ -471,6 +488,29 @@ rule choices:
         "../scripts/choices.py"
 
 
+rule answers:
+    output:
+        f"{BENCHMARK}/answers.csv",
+    log:
+        f"{BENCHMARK}/logs/answers.log",
+    benchmark:
+        f"{BENCHMARK}/benchmarks/answers.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    params:
+        library=library("validation.answers"),
+        mixture={20: 0.5, 50: 0.5},
+        frictions=[0.0, 0.3],
+        packings=2 if QUICK else 6,
+    message:
+        "ways to a resistance and a filter area"
+    script:
+        "../scripts/answers.py"
+
+
 rule coverage:
     input:
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
@@ -505,6 +545,7 @@ rule benchmark_page:
         ),
         reference=str(DATA / "reference_replicates.csv"),
         choices=tables_of_page(str(DATA / "choices.csv"), f"{BENCHMARK}/choices.csv"),
+        answers=tables_of_page(str(DATA / "answers.csv"), f"{BENCHMARK}/answers.csv"),
         template=str(ROOT / "workflow" / "report" / "benchmark.md.j2"),
     output:
         table="{folder}/run_time_error.csv",

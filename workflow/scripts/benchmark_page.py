@@ -29,6 +29,7 @@ with job(snakemake.log[0], snakemake.output):
         references,
         read_table(snakemake.input.choices),
         read_table(snakemake.input.coverage),
+        read_table(snakemake.input.answers),
         Path(snakemake.params.data),
     )
     with publish(Path(snakemake.output.page)) as temporary:

@@ -16,6 +16,7 @@ from filtercake.packing import cell_kernels, contact_law
 from filtercake.packing.cell import CellScene, Look
 from filtercake.packing.cloud import size_levels
 from filtercake.packing.engines import embedded_kernels as kernels
+from filtercake.packing.engines import pair_kernels
 from filtercake.units import MICROMETRE, FloatArray, IntArray
 
 SKIN_DIAMETERS: Final = (0.06, 1.0)
@@ -62,6 +63,7 @@ class CellBox:
         self.widest = 2.0 * float(scene.radius.max())
         self.box = np.array([np.full(3, sides), np.zeros(3)])
         self.find_pairs = kernels.make_find_pairs(False)
+        self.pair_constants = kernels.make_pair_constants(False)
         self.room = 8 * n
         self.listed_at = 0
         self.skin = SKIN_DIAMETERS[1] * self.smallest
@@ -110,7 +112,7 @@ class CellBox:
 
     def momentum(self) -> FloatArray:
         """Momentum relative to the box, kg m/s, shape (3,)."""
-        return np.asarray(self.spheres[:, kernels.MASS] @ self.velocity)
+        return np.asarray(self.spheres[:, pair_kernels.MASS] @ self.velocity)
 
     def advance(self, steps: int) -> None:
         """Advance by ``steps`` time steps.
@@ -215,21 +217,37 @@ class CellBox:
     def _search(self) -> _Found:
         """Find the pairs closer than the skin."""
         n, length = self.identity.size, self.length
-        above = np.flatnonzero(self.spheres[:, kernels.Z] < self.spheres[:, 3] + 0.5 * self.widest + self.skin)
+        above = np.flatnonzero(self.spheres[:, pair_kernels.Z] < self.spheres[:, 3] + 0.5 * self.widest + self.skin)
         owner = np.concatenate([np.arange(n), above])
         rows = self.spheres[owner]
-        rows[n:, kernels.Z] += self.height
+        rows[n:, pair_kernels.Z] += self.height
         level = self.level[owner]
         cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
-        top = float(rows[:, kernels.Z].max())
+        top = float(rows[:, pair_kernels.Z].max())
         index, start, shape, offset = kernels.sort_into_cells(rows, level, cell_size, length, top)
         place = np.empty_like(index)
         place[index] = np.arange(index.size)
-        grid = kernels.Grid(length, level, rows[index, :4], index, place, start, shape, offset, self.largest, cell_size)
+        half = 0.5 * self.skin
+        grid = kernels.Grid(
+            length=length,
+            level=level,
+            # in the box none has a course of its own
+            spheres=np.column_stack([rows[index, :4], np.full(index.size, half), np.zeros(index.size)]),
+            fast=np.zeros(index.size, dtype=np.bool_),
+            member=index,
+            place=place,
+            start=start,
+            shape=shape,
+            offset=offset,
+            largest=self.largest,
+            cell_size=cell_size,
+            stride=np.full((2, self.largest.size), half),
+            horizon=0,
+        )
         first, neighbour = self._raw_pairs(rows, grid)
         second, code = (
-            (neighbour & kernels.INDEX_MASK).astype(np.int64),
-            (neighbour >> kernels.IMAGE_SHIFT).astype(np.int64),
+            (neighbour & pair_kernels.INDEX_MASK).astype(np.int64),
+            (neighbour >> pair_kernels.IMAGE_SHIFT).astype(np.int64),
         )
         high = (np.arange(owner.size) >= n).astype(np.int64)
         image = np.column_stack([code % 3 - 1, code // 3 - 1, high[second] - high[first]])
@@ -241,10 +259,9 @@ class CellBox:
         size = rows.shape[0]
         first, last = np.empty(size, dtype=np.uint64), np.empty(size, dtype=np.uint64)
         while True:
-            pairs = _pairs(first, last, np.empty(self.room, dtype=np.uint32), False)._replace(
-                bounds=np.array([0, size])
-            )
-            count = self.find_pairs(rows, grid, self.skin, pairs)
+            neighbour = np.empty(self.room, dtype=np.uint32)
+            pairs = _pairs(first, last, neighbour, False)
+            count = self.find_pairs(rows, grid, pairs)
             if count < self.room:
                 counts = (last - first).astype(np.int64)
                 return np.repeat(np.arange(size), counts), pairs.neighbour[:count]
@@ -263,7 +280,7 @@ class CellBox:
         code, owner = np.divmod(images, n)
         shift = np.column_stack([code % 3, code // 3 % 3, code // 9]) - 1.0
         bounds = np.searchsorted(found.first[by_first], np.arange(n + 1)).astype(np.uint64)
-        same = np.uint32(kernels.SAME_IMAGE) << kernels.IMAGE_SHIFT
+        same = np.uint32(pair_kernels.SAME_IMAGE) << pair_kernels.IMAGE_SHIFT
         self._work_on(owner, shift, bounds[:-1], bounds[1:], row.astype(np.uint32) | same, None)
         if self.frictional:
             partners = self.pairs._replace(neighbour=second.astype(np.uint32))
@@ -289,9 +306,8 @@ class CellBox:
         self.pairs = _pairs(first, last, neighbour, self.frictional)
         if spring is not None:
             self.pairs.spring[...] = spring
-        kernels.pair_constants(
-            self.bodies.state, self.pairs, self.scene.modulus, contact_law.damping_ratio(self.scene.restitution)
-        )
+        damping_ratio = contact_law.damping_ratio(self.scene.restitution)
+        self.pair_constants(self.bodies.state, self.pairs, self.scene.modulus, damping_ratio)
 
 
 def _wrapped(position: FloatArray, sides: FloatArray) -> FloatArray:
@@ -304,8 +320,8 @@ def _wrapped(position: FloatArray, sides: FloatArray) -> FloatArray:
 def _attraction(scene: CellScene) -> int:
     """Choose the kind of attraction that the kernels are compiled for."""
     if scene.adhesion > 0.0:
-        return kernels.ADHESION
-    return kernels.COHESION if scene.cohesion > 0.0 else kernels.NO_ATTRACTION
+        return pair_kernels.ADHESION
+    return pair_kernels.COHESION if scene.cohesion > 0.0 else pair_kernels.NO_ATTRACTION
 
 
 def _law(scene: CellScene) -> kernels.Law:
@@ -327,17 +343,19 @@ def _law(scene: CellScene) -> kernels.Law:
 def _pairs(
     first: kernels.Unsigned, last: kernels.Unsigned, neighbour: kernels.Neighbours, frictional: bool
 ) -> kernels.Pairs:
-    """Make a pair list; all pairs count as near ones."""
-    constants = np.empty((neighbour.size, 2))
+    """Make a pair list with room for its near ones."""
+    size = neighbour.size
     return kernels.Pairs(
         bounds=np.array([0, first.size]),
+        halo=np.zeros((1, 2), dtype=np.int64),
         first=first,
         last=last,
         neighbour=neighbour,
-        constants=constants,
-        spring=np.zeros((max(neighbour.size, 1) if frictional else 1, 3)),
-        near_last=last,
-        near_neighbour=neighbour,
-        near_constants=constants,
-        near_pair=np.arange(neighbour.size, dtype=np.uint32),
+        constants=np.empty((size, 2)),
+        spring=np.zeros((max(size, 1) if frictional else 1, 3)),
+        near_end=np.zeros(1, dtype=np.uint64),
+        near_owner=np.empty(size, dtype=np.uint32),
+        near_neighbour=np.empty(size, dtype=np.uint32),
+        near_constants=np.empty((2, size + pair_kernels.VECTOR)),
+        near_pair=np.empty(size, dtype=np.uint32),
     )

@@ -18,7 +18,8 @@ from numba.misc.special import literally
 
 from filtercake.packing.compiled import cached_njit
 from filtercake.packing.engines import embedded_kernels as kernels
-from filtercake.packing.engines.embedded_kernels import FUSED, MASS, RADIUS, U, X
+from filtercake.packing.engines import pair_kernels
+from filtercake.packing.engines.pair_kernels import FUSED, INDEX_MASK, MASS, RADIUS, U, X
 from filtercake.units import FloatArray, IntArray
 
 
@@ -88,6 +89,8 @@ class Averages(NamedTuple):
     overlap: float
 
 
+SPEED_ROOM = 1.5
+"""Limit of the speeds while a choice of near pairs lasts, over the largest speed at its beginning."""
 LEAST_ROOM = 0.1
 """Share of the skin that is kept for the step in which its end is noticed."""
 
@@ -195,6 +198,15 @@ def room_left(state: FloatArray, sides: FloatArray, reach: Reach) -> float:
     return scale * reach.skin - max(1.0 - scale, 0.0) * reach.widest - 2.0 * math.sqrt(farthest)
 
 
+@_compiled
+def _fastest(velocity: FloatArray) -> float:
+    """Return the largest speed in the box, m/s."""
+    fastest = 0.0
+    for i in range(velocity.shape[0]):
+        fastest = max(fastest, velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2)
+    return math.sqrt(fastest)
+
+
 @cache
 def make_advance(attraction: int, frictional: bool, uniaxial: bool) -> Callable[..., tuple[int, bool]]:
     """Compile the time loop for one kind of scene: what it doesn't need is not in its code.
@@ -217,11 +229,20 @@ def make_advance(attraction: int, frictional: bool, uniaxial: bool) -> Callable[
         Real distances are taken only when the sum of the largest speeds says so.
         """
         time_step, box = law.time_step, motion.box
-        room = 0.0
+        strained = 0.5 * servo.fastest * (reach.widest + reach.skin)  # by what the box alone brings a sphere nearer
+        count = (bodies.state.shape[0] + kernels.PATCH - 1) // kernels.PATCH
+        patches = kernels.Patches(np.zeros(count), np.zeros(count))
+        speed = _fastest(motion.velocity)
+        room, limit, picked = 0.0, 0.0, 0
         for done in range(steps):
             place_images(bodies, motion, frictional)
+            if picked == 0 or speed > limit:
+                picked, limit = kernels.NEAR_STEPS, SPEED_ROOM * speed
+                patches.limit[:] = limit + strained
+                kernels.pick_near(0, bodies.state, pairs, patches, law)
+            picked -= 1
             _clear(bodies, frictional)
-            kernels.pair_forces(0, bodies, pairs, law, time_step, attraction, frictional)
+            pair_kernels.pair_forces(0, bodies, pairs, law, time_step, attraction, frictional)
             volume = box[0, 0] * (box[0, 1] * box[0, 2])
             pressure = _axial(bodies) / volume if uniaxial else _trace(bodies) / (3.0 * volume)
             gather(bodies, motion, frictional)
@@ -254,19 +275,21 @@ def _contact_force(
 ) -> float:
     """Magnitude of the force in one contact, N: the law applied to its two spheres ``alone``."""
     literally(attraction), literally(frictional)
-    j = pairs.neighbour[pair] & kernels.INDEX_MASK
+    j = pairs.neighbour[pair] & INDEX_MASK
     alone.state[0], alone.state[1] = bodies.state[i], bodies.state[j]
     if frictional:
         alone.spin[0], alone.spin[1] = bodies.spin[i], bodies.spin[j]
     _clear(alone, frictional)
     here, one = np.zeros(1, dtype=np.uint64), np.ones(1, dtype=np.uint64)
-    other = np.full(1, np.uint32(1) | (kernels.SAME_IMAGE << kernels.IMAGE_SHIFT), dtype=np.uint32)
+    other = np.full(1, np.uint32(1) | (pair_kernels.SAME_IMAGE << pair_kernels.IMAGE_SHIFT), dtype=np.uint32)
     constants, spring = pairs.constants[pair : pair + 1], pairs.spring[:1].copy()
     if frictional:
         spring[0] = pairs.spring[pair]
-    which = np.zeros(1, dtype=np.uint32)
-    lone = kernels.Pairs(np.array([0, 1]), here, one, other, constants, spring, one, other, constants, which)
-    kernels.pair_forces(0, alone, lone, law, 0.0, attraction, frictional)
+    which, near = np.zeros(1, dtype=np.uint32), np.ones((2, 1 + pair_kernels.VECTOR))
+    near[0, 0], near[1, 0] = constants[0, 0], constants[0, 1]
+    halo = np.zeros((1, 2), dtype=np.int64)
+    lone = kernels.Pairs(np.array([0, 1]), halo, here, one, other, constants, spring, one, which, other, near, which)
+    pair_kernels.pair_forces(0, alone, lone, law, 0.0, attraction, frictional)
     force = alone.force[0, 0]
     return math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
 
@@ -285,7 +308,7 @@ def make_measure(attraction: int, frictional: bool) -> Callable[..., Averages]:
         stress, contacts, total, overlap = np.zeros((3, 3)), 0, 0.0, 0.0
         for i in range(n):
             for p in range(pairs.first[i], pairs.last[i]):
-                j = pairs.neighbour[p] & kernels.INDEX_MASK
+                j = pairs.neighbour[p] & INDEX_MASK
                 way = state[i, X : X + 3] - state[j, X : X + 3]
                 touching = state[i, RADIUS] + state[j, RADIUS]
                 apart = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])

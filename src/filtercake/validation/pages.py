@@ -56,14 +56,16 @@ def benchmark(
     references: pd.DataFrame,
     choices: pd.DataFrame,
     coverage: pd.DataFrame,
+    answers: pd.DataFrame,
     data: Path,
 ) -> str:
     """Write the page on run time and error.
 
     The tables are those of :func:`filtercake.validation.error_against_time.errors` (all cases, with ``on_front``),
-    :func:`reference_table`, :func:`~filtercake.validation.error_against_time.choice_table` and
-    :func:`~filtercake.validation.error_against_time.coverage`; ``data`` is the folder of the committed results of long
-    computations, whose tables the page shows too.
+    :func:`reference_table`, :func:`~filtercake.validation.error_against_time.choice_table`,
+    :func:`~filtercake.validation.error_against_time.coverage` and
+    :func:`~filtercake.validation.answers.answers` (with the column friction); ``data`` is the folder of the committed
+    results of long computations, whose tables the page shows too.
     """
     stored = [path for path in sorted(data.glob("*.csv")) if "replicates" not in path.stem]
     tables = {path.stem: _records(pd.read_csv(path)) for path in stored}
@@ -72,6 +74,7 @@ def benchmark(
         errors=_records(errors),
         references={row["case"]: row for row in _records(references)},
         choices=_records(choices),
+        answers=_records(answers),
         coverage={
             "repeats": len(coverage),
             "met": int((coverage["covered"] & coverage["reached"]).sum()),

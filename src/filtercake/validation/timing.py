@@ -17,12 +17,13 @@ import pandas as pd
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.errors import CloudError, EngineError, EngineMissing, PackingRejected
 from filtercake.packing.accept import accept
-from filtercake.packing.engines import Engine, get_engine
+from filtercake.packing.engines import ENGINES, Engine, get_engine
 from filtercake.packing.pack import Report, settle
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing
 from filtercake.packing.scene import Scene
 from filtercake.statistics import difference_half_width, half_width
+from filtercake.validation.lammps_engine import Lammps
 
 WARM_UP_PARTICLES = 60
 """Spheres packed before the clock starts: the embedded engine's kernels are compiled once per machine."""
@@ -65,11 +66,17 @@ def contender(name: str, scene: Scene, time_step: float = 0.0, skin: float = 0.0
     steps : int
         Its fixed number of time steps.
     """
-    engine = get_engine(name)
+    engine = Lammps() if name == Lammps.name else get_engine(name)
     if engine.fixed_steps:
         engine.fixed_steps = steps
         scene = replace(scene, time_step=time_step, skin=skin)
     return Contender(name, replace(scene, engine=name), engine)
+
+
+def present(names: Iterable[str]) -> list[str]:
+    """Return those engines' names that can run here."""
+    made = {name: Lammps() if name == Lammps.name else ENGINES[name]() for name in names}
+    return [name for name, engine in made.items() if engine.why_missing() is None]
 
 
 def time_in_turn(
@@ -165,6 +172,7 @@ def compare(timings: pd.DataFrame) -> pd.DataFrame:
                 "n_not_accepted": int((group["status"] != "ok").sum()),
                 "median_s": group["wall_s"].median(),
                 "times_faster": base["wall_s"].median() / group["wall_s"].median(),
+                **_range_of_ratios(base, group),
                 "porosity": values.mean(),
                 "porosity_ci95": half_width(values),
                 "difference": difference,
@@ -174,3 +182,10 @@ def compare(timings: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def _range_of_ratios(base: pd.DataFrame, group: pd.DataFrame) -> dict[str, float]:
+    """Smallest and largest ratio of the times of one replicate, made right after each other."""
+    of_base, of_group = (rows.set_index("replicate")["wall_s"] for rows in (base, group))
+    ratios = (of_base / of_group).dropna()
+    return {"times_faster_low": float(ratios.min()), "times_faster_high": float(ratios.max())}

@@ -66,6 +66,18 @@ def coverage_rows() -> pd.DataFrame:
     return pd.DataFrame({"n": [6, 9, 12], "covered": [True, True, False], "reached": [True, True, True]})
 
 
+def answer_rows() -> pd.DataFrame:
+    row = {"protocol": "gravity", "n": 6, "seconds": 0.5, "porosity": 0.352, "resistance_m_kg": 3.1e9, "spread": 0.021}
+    errors = {"resistance_error": -0.17, "resistance_error_ci95": 0.012, "filter_area_m2": 3.44, "area_error": -0.08}
+    estimate = {"law": "instant estimate", "protocol": "filtration", "resistance_error_ci95": 0.01, "spread": np.nan}
+    return pd.DataFrame([{**row, "law": "additive", **errors}, {**row, **errors, **estimate}]).assign(friction=0.3)
+
+
+def benchmark_page(errors: pd.DataFrame) -> str:
+    tables = errors, references(), choice_rows(), coverage_rows(), answer_rows()
+    return pages.benchmark(TEMPLATES / "benchmark.md.j2", *tables, REPOSITORY / "docs" / "data")
+
+
 def test_the_headline_compares_with_the_papers_own_estimator() -> None:
     found = pages.headline(error_rows())
     assert found["published"]["estimator"] == "count"
@@ -95,13 +107,16 @@ def test_the_benchmark_page_holds_the_tables_numbers() -> None:
     errors = error_rows().assign(on_front=True)
     errors.loc[errors.index[3], "bias"] = -0.0048
     errors.loc[errors.index[4], ["n", "n_failed"]] = [5, 3]
-    data = REPOSITORY / "docs" / "data"
-    page = pages.benchmark(TEMPLATES / "benchmark.md.j2", errors, references(), choice_rows(), coverage_rows(), data)
+    page = benchmark_page(errors)
     assert "| pmma | filtercake's default | 0.5 | 200 |" in page
     assert "| pmma | fastest with no larger an error: spheres 0.5 | 0.125 | 800 |" in page
     assert "| drop height | the paper's | 2 times | -0.0040 +- 0.0010 | +4.0 % |" in page
     assert "| pmma | 0.3512 | 0.0004 | 24 |" in page
     assert "in 2 of 3" in page
+    assert "| 0.3 | gravity | additive | 0.5 | 0.3520 | 3.1e+09 | -17.0 +- 1.2 % | 2.1 % | 3.44 | -8.0 % |" in page
+    assert (
+        "| 0.3 | filtration | instant estimate | 0.5 | 0.3520 | 3.1e+09 | -17.0 +- 1.0 % | – | 3.44 | -8.0 % |" in page
+    )
     assert "Biased: spheres 0.5 (-0.0048)." in page
     assert "Failed: engine (liggghts) (3 of 8)." in page
     assert "| pmma | count | 0.3500 |" in page
@@ -114,8 +129,7 @@ def test_the_benchmark_page_holds_the_tables_numbers() -> None:
 def test_what_one_packing_does_not_tell_is_a_dash() -> None:
     errors = error_rows().assign(on_front=True)
     errors.loc[errors["axis"] == "default", ["n", "sd", "bias_se", "bias_ci95", "error"]] = [1, *[np.nan] * 4]
-    data = REPOSITORY / "docs" / "data"
-    page = pages.benchmark(TEMPLATES / "benchmark.md.j2", errors, references(), choice_rows(), coverage_rows(), data)
+    page = benchmark_page(errors)
     assert "| pmma | interior slab | 0.3500 | +0.0000 +- – | – | – |" in page
 
 

@@ -17,21 +17,24 @@ from filtercake.errors import EngineError
 from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud, size_levels
 from filtercake.packing.engines import embedded_kernels as kernels
+from filtercake.packing.engines import pair_kernels
 from filtercake.packing.scene import Scene
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
-SKIN_DIAMETERS = (0.08, 1.5)
-"""Narrowest and widest neighbour skin, over the smallest diameter."""
-LISTING_STEPS = 250
-"""Time steps that a list of pairs should last: the skin follows from it and from the fastest sphere."""
-APPROACH_SKINS = 2.0
-"""Skins by which a sphere and an airborne one surely do not approach each other between two listings.
+LISTING_STEPS = 200
+"""Time steps that a list of pairs lasts, unless a sphere leaves the room it was given."""
+LEAST_ROOM = 0.04
+"""Least room of a sphere, over the smallest diameter."""
+FAST_DIAMETERS, FAST_SHARE = 0.3, 0.03
+"""Spheres that find their neighbours themselves, so that the others need not look as far: they may get farther than
+this over the smallest diameter while the list lasts, and are no more than this share of all."""
+CELL_DIAMETERS = 1.1
+"""Least side of a grid's cells, over the largest diameter of its level."""
+WAKING_FALLS = 2.5
+"""Height over the bed up to which falling spheres join it, over what they fall while a list lasts.
 
-The frame sinks by less than half a skin, a sphere in the bed rises by less than half a skin in it, and an airborne
-one falls by less than one (twice the frame's speed).
+What lies there rises as they come down: it meets them from 2.2 falls above.
 """
-MARGIN_DIAMETERS = 0.05
-"""Height over the bed up to which falling spheres are in the pair list, over the largest diameter."""
 CEILING_BOXES = 5.0
 """Height over the box side, or over the cloud's, at which a bed counts as exploded."""
 
@@ -47,23 +50,27 @@ STATE_ARRAYS = (
     "spin",
     "floor_spring",
     "reference",
+    "course",
+    "room",
     *SIZED_ARRAYS,
 )
-STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at", "skin", "frame_step")
+STATE_NUMBERS = ("count", "step", "ready", "starting", "listed", "listed_at")
 
 
 def _no_pairs(threads: int, capacity: int, frictional: bool) -> kernels.Pairs:
     """Make an empty pair list with room for ``capacity`` pairs."""
     return kernels.Pairs(
         bounds=np.zeros(threads + 1, dtype=np.int64),
+        halo=np.zeros((threads, 2), dtype=np.int64),
         first=np.empty(0, dtype=np.uint64),
         last=np.empty(0, dtype=np.uint64),
         neighbour=np.empty(capacity, dtype=np.uint32),
         constants=np.empty((capacity, 2)),
         spring=np.zeros((capacity if frictional else 1, 3)),
-        near_last=np.empty(0, dtype=np.uint64),
+        near_end=np.zeros(threads, dtype=np.uint64),
+        near_owner=np.empty(capacity, dtype=np.uint32),
         near_neighbour=np.empty(capacity, dtype=np.uint32),
-        near_constants=np.empty((capacity, 2)),
+        near_constants=np.empty((2, capacity + pair_kernels.VECTOR)),
         near_pair=np.empty(capacity, dtype=np.uint32),
     )
 
@@ -115,20 +122,21 @@ class Bed:
         self.bottom = position[:, 2] - radius  # at release; rows of airborne spheres count
         self.ceiling = CEILING_BOXES * max(length, float(position[:, 2].max(initial=0.0)))
         self._set_material()
-        self.force = np.zeros((threads, n, 3))
-        self.torque = np.zeros((threads, n if self.frictional else 1, 3))
-        self.reference = np.zeros((n, 3))
+        layers = threads + 1 if threads > 1 else 1  # memory that is never written to is never taken
+        self.force = np.zeros((layers, n, 3))
+        self.torque = np.zeros((layers, n if self.frictional else 1, 3))
+        self.reference, self.course, self.room = np.zeros((n, 3)), np.zeros(n), np.zeros(n)
         self.watched = np.empty(0, dtype=np.int64)
         self.grounded = np.empty(0, dtype=np.int64)
         self.pairs = _no_pairs(threads, 8 * n + 64 * threads, self.frictional)
-        self.skin, self.frame_step = 0.0, 0.0
         self.count = n
         self.step = 0
         self.ready, self.starting, self.listed = False, True, False
         self.listed_at = 0  # step of the last listing
-        attraction = kernels.COHESION if scene.cohesion > 0.0 else kernels.NO_ATTRACTION
+        attraction = pair_kernels.COHESION if scene.cohesion > 0.0 else pair_kernels.NO_ATTRACTION
         self.kernel = kernels.make_advance(attraction, self.frictional, threads > 1)
         self.find_pairs = kernels.make_find_pairs(threads > 1)
+        self.pair_constants = kernels.make_pair_constants(threads > 1)
 
     @classmethod
     def from_cloud(cls, cloud: Cloud, scene: Scene, threads: int = 1) -> Bed:
@@ -220,61 +228,89 @@ class Bed:
 
     def _run(self, steps: int) -> int:
         n = self.count
-        moment = kernels.Moment(self.ready, self.starting, self.frame_step * (self.step - self.listed_at))
+        moment = kernels.Moment(self.ready, self.starting, self.step - self.listed_at)
         bodies = kernels.Bodies(self.spheres[:n], self.spin[:n], self.force, self.torque)
         floor = kernels.Floor(self.floor[:n], self.floor_spring[:n], self.grounded)
-        listing = kernels.Listing(self.reference[:n], self.watched, self.skin, self.frame_step)
-        done, self.ready = self.kernel(steps, moment, bodies, floor, self.pairs, listing, self.law)
+        done, self.ready = self.kernel(steps, moment, bodies, floor, self.pairs, self._listing(), self.law)
         self.starting = self.starting and done == 0
         self.listed = self.ready
         return int(done)
 
+    def _listing(self) -> kernels.Listing:
+        n = self.count
+        return kernels.Listing(self.reference[:n], self.course[:n], self.room[:n], self.watched, LISTING_STEPS)
+
     def _prepare(self) -> None:
         """Wake the airborne spheres that the bed may reach, and list the pairs."""
-        falling = not self.touched.all()
-        # half way between what falls and what lies: neither moves more than half as much in this frame
-        self.frame_step = -0.5 * self.falling_speed(self.step) * self.scene.time_step if falling else 0.0
-        self.skin = self._choose_skin()
-        self._mark_touched()
+        order = self._sort()
+        self._give_room()
         while self._wake():  # what was woken may be about to meet the floor itself
-            self._mark_touched()
+            self._give_room()
         if self.count:
-            self._list_pairs()
+            self._list_pairs(order)
             self._watch()
 
-    def _mark_touched(self) -> None:
-        """Note which spheres have left the parabola, or will meet the floor before they are looked at again.
+    def _sort(self) -> IntArray:
+        """Sort the bed so that spheres close in space are close in memory; return where each stood before."""
+        n = self.count
+        if n == 0:
+            return np.empty(0, dtype=np.int64)
+        self.position[:n, :2] %= self.length
+        if not float(self.position[:n, 2].max()) < self.ceiling:
+            raise EngineError(
+                "the bed exploded: spheres fly far above where they started; use a shorter time step",
+                outcome="exploded",
+            )
+        # spheres of any size together: by small cubes
+        order = self._by_cell(self.spheres[:n], np.zeros(n, dtype=np.int64), self.largest[:1])[0]
+        for array in self._arrays():
+            array[:n] = array[:n][order]
+        return order
+
+    def _by_cell(
+        self, spheres: FloatArray, level: IntArray, cell_size: FloatArray
+    ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        top = max(float(spheres[:, 2].max()), 0.0)
+        return kernels.sort_into_cells(spheres, level, cell_size, self.length, top)
+
+    def _give_room(self) -> None:
+        """Give each sphere a course and room to leave it, and note which have left the parabola, or may yet.
 
         A sphere that another has touched moves sideways; until then its sideways velocity is nothing to the last bit.
+        One that may meet the floor before the next look counts as touched.
         """
         n = self.count
+        least = 0.5 * self.scene.skin if self.scene.skin > 0.0 else LEAST_ROOM * self.smallest
+        kernels.give_room(self.spheres[:n], self.law, least, self._listing())
         self.touched[:n] |= (self.velocity[:n, 0] != 0.0) | (self.velocity[:n, 1] != 0.0)
-        self.touched[:n] |= self.position[:n, 2] - self.radius[:n] < self.skin
+        self.touched[:n] |= self._may_land()
 
-    def _choose_skin(self) -> float:
-        """Skin, m, that lasts ``LISTING_STEPS`` at the present speeds, within bounds set by the smallest size."""
-        if self.scene.skin > 0.0:
-            return self.scene.skin
-        n, step = self.count, self.scene.time_step
-        relative = self.velocity[:n].copy()
-        relative[:, 2] -= self.frame_step / step
-        speed = math.sqrt(float(np.einsum("ij,ij->i", relative, relative).max(initial=0.0)))
-        wanted = 2.0 * max(speed, abs(self.frame_step) / step) * step * LISTING_STEPS
-        low, high = SKIN_DIAMETERS
-        return min(max(wanted, low * self.smallest), high * self.smallest)
+    def _may_land(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Whether each sphere may meet the floor while the list lasts."""
+        n = self.count
+        falls = LISTING_STEPS * np.maximum(-self.course[:n], 0.0) + self.room[:n]
+        return np.asarray(self.position[:n, 2] - self.radius[:n] < falls)
+
+    def _tops(self) -> FloatArray:
+        """Greatest height that each sphere may reach while the list lasts, m."""
+        n = self.count
+        rise = LISTING_STEPS * np.maximum(self.course[:n], 0.0) + self.room[:n]
+        return np.asarray(self.position[:n, 2] + self.radius[:n] + rise)
+
+    def _fall(self, step: int) -> float:
+        """Distance that an airborne sphere falls while a list of this step lasts, m."""
+        return self.fallen(step + LISTING_STEPS) - self.fallen(step)
 
     def _line(self, step: int, top: float) -> float:
         """Height at release, m, below which spheres join a bed of height ``top`` (m) at a step."""
-        margin = APPROACH_SKINS * self.skin + MARGIN_DIAMETERS * 2.0 * float(self.largest[0])
-        return top + margin + self.fallen(step)
+        return top + WAKING_FALLS * self._fall(step) + self.fallen(step)
 
     def _wake(self) -> bool:
         """Move the airborne spheres that the touched ones may reach soon into the bed; say whether there were any."""
         first = self.count
         if first == self.total:
             return False
-        touched = self.touched[:first]
-        top = float((self.position[:first, 2] + self.radius[:first])[touched].max(initial=0.0))
+        top = float(self._tops()[self.touched[:first]].max(initial=0.0))
         last = first + int(np.searchsorted(self.bottom[first:], self._line(self.step, top)))
         self.position[first:last, 2] -= self.fallen(self.step)
         # velocities are kept half a step back
@@ -298,49 +334,58 @@ class Bed:
     def _watch(self) -> None:
         """Note the spheres that may meet the floor, and those that may have airborne neighbours.
 
-        The time loop stops when one of the latter is touched.
+        The time loop stops when one of the latter is touched: until then it falls as they do.
         """
         n = self.count
-        # the frame and a sphere in it move by half a skin each before the next listing
-        self.grounded = np.flatnonzero(self.position[:n, 2] - self.radius[:n] < self.skin)
+        self.grounded = np.flatnonzero(self._may_land())
         if n == self.total:
             self.watched = np.empty(0, dtype=np.int64)
             return
-        reach = self.position[:n, 2] + self.radius[:n] + APPROACH_SKINS * self.skin + self.fallen(self.step)
-        self.watched = np.flatnonzero(reach > self.bottom[n])
+        lowest = self.bottom[n] - self.fallen(self.step)
+        self.watched = np.flatnonzero(self._tops() + self._fall(self.step) > lowest)
 
-    def _list_pairs(self) -> None:
-        """Sort the bed into cells and list its pairs anew; tangential springs are carried over."""
+    def _list_pairs(self, order: IntArray) -> None:
+        """List the bed's pairs anew; tangential springs are carried over from where the spheres stood (``order``)."""
         n = self.count
-        self.position[:n, :2] %= self.length
-        top = float(self.position[:n, 2].max())
-        if not top < self.ceiling:
-            raise EngineError(
-                "the bed exploded: spheres fly far above where they started; use a shorter time step",
-                outcome="exploded",
-            )
-        cell_size = np.maximum(2.0 * self.largest, self.smallest) + self.skin
-        top = max(top, 0.0)
-        # spheres of any size that are close in space, close in memory: by small cubes
-        cubes = self.largest[:1]
-        order = kernels.sort_into_cells(self.spheres[:n], np.zeros(n, dtype=np.int64), cubes, self.length, top)[0]
-        for array in self._arrays():
-            array[:n] = array[:n][order]
-        spheres, level = self.spheres[:n], self.level[:n]
-        index, start, shape, offset = kernels.sort_into_cells(spheres, level, cell_size, self.length, top)
-        place = np.empty_like(index)
-        place[index] = np.arange(n)
-        grid = kernels.Grid(
-            self.length, level, spheres[index, :4], index, place, start, shape, offset, self.largest, cell_size
-        )
-        pairs = self._find_pairs(grid)
-        kernels.pair_constants(self.spheres[:n], pairs, self.modulus, self.damping_ratio)
+        pairs = self._find_pairs(self._grid())
+        self._share_work(pairs)
+        self.pair_constants(self.spheres[:n], pairs, self.modulus, self.damping_ratio)
         if self.frictional:
-            self._carry_springs(order, pairs)
+            origin = np.full(n, -1)
+            origin[: order.size] = np.where(order < self.pairs.first.size, order, -1)  # the first list has none before
+            kernels.carry_springs(origin, self.pairs, pairs)
         self.pairs = pairs
-        self._share_work()
         self.reference[:n] = self.position[:n]
         self.listed, self.listed_at = True, self.step
+
+    def _grid(self) -> kernels.Grid:
+        """Sort the spheres into the cells of their size levels."""
+        n, levels = self.count, self.largest.size
+        spheres, level = self.spheres[:n], self.level[:n]
+        cell_size = CELL_DIAMETERS * np.maximum(2.0 * self.largest, self.smallest)
+        index, start, shape, offset = self._by_cell(spheres, level, cell_size)
+        place = np.empty_like(index)
+        place[index] = np.arange(n)
+        stride = self.room[:n] + LISTING_STEPS * np.abs(self.course[:n])
+        fast = stride > max(FAST_DIAMETERS * self.smallest, float(np.quantile(stride, 1.0 - FAST_SHARE)))
+        strides = np.zeros((2, levels))
+        np.maximum.at(strides[0], level[~fast], stride[~fast])
+        np.maximum.at(strides[1], level, stride)
+        return kernels.Grid(
+            length=self.length,
+            level=level,
+            spheres=np.column_stack([spheres[index, :4], self.room[index], self.course[index]]),
+            fast=fast[index],
+            member=index,
+            place=place,
+            start=start,
+            shape=shape,
+            offset=offset,
+            largest=self.largest,
+            cell_size=cell_size,
+            stride=strides,
+            horizon=LISTING_STEPS,
+        )
 
     def _find_pairs(self, grid: kernels.Grid) -> kernels.Pairs:
         n, capacity = self.count, self.pairs.neighbour.size
@@ -350,20 +395,19 @@ class Bed:
         first, last = np.empty(n, dtype=np.uint64), np.empty(n, dtype=np.uint64)
         while True:
             pairs = pairs._replace(bounds=bounds, first=first, last=last)
-            count = self.find_pairs(self.spheres[:n], grid, self.skin, pairs)
+            count = self.find_pairs(self.spheres[:n], grid, pairs)
             if count < pairs.neighbour.size // self.threads:
-                return pairs._replace(near_last=last.copy())
+                return pairs
             pairs = _no_pairs(self.threads, int(1.3 * count) * self.threads, self.frictional)
 
-    def _carry_springs(self, order: IntArray, pairs: kernels.Pairs) -> None:
-        origin = np.where(order < self.pairs.first.size, order, -1)
-        kernels.carry_springs(origin, self.pairs, pairs)
-
-    def _share_work(self) -> None:
-        """Give every thread as many pairs as the others."""
-        done = np.cumsum(self.pairs.last - self.pairs.first)
+    def _share_work(self, pairs: kernels.Pairs) -> None:
+        """Give every thread as many pairs as the others, and note whose spheres they act on."""
+        if self.threads == 1:
+            return
+        done = np.cumsum(pairs.last - pairs.first)
         shares = np.arange(1, self.threads) * (done[-1] / self.threads)
-        self.pairs.bounds[1:-1] = np.searchsorted(done, shares)
+        pairs.bounds[1:-1] = np.searchsorted(done, shares)
+        kernels.find_halos(pairs)
 
     def _arrays(self) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.generic]], ...]:
         arrays = [self.spheres, self.floor, self.force[0], self.identity, self.level, self.touched]

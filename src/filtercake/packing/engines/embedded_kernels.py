@@ -16,6 +16,24 @@ from numba import prange
 from numba.misc.special import literally
 
 from filtercake.packing.compiled import cached_njit
+from filtercake.packing.engines import pair_kernels
+from filtercake.packing.engines.pair_kernels import (
+    COHESION,
+    DAMPING,
+    FUSED,
+    IMAGE_SHIFT,
+    INDEX_MASK,
+    MASS,
+    RADIUS,
+    SAME_IMAGE,
+    STIFFNESS,
+    U,
+    V,
+    W,
+    X,
+    Y,
+    Z,
+)
 from filtercake.units import FloatArray, IntArray
 
 Unsigned = np.ndarray[Any, np.dtype[np.uint64]]
@@ -31,8 +49,10 @@ class Grid(NamedTuple):
         Side of the periodic box, m.
     level : ndarray, shape (n,)
         Size level of each sphere of the bed, 0 the coarsest.
-    spheres : ndarray, shape (n, 4)
-        Position and radius, sorted by level and cell.
+    spheres : ndarray, shape (n, 6)
+        Position, radius, room and course (:class:`Listing`), sorted by level and cell.
+    fast : ndarray, shape (n,)
+        Which of these are searched for from nowhere: they search for all others themselves.
     member : ndarray, shape (n,)
         Where each of these stands in the bed.
     place : ndarray, shape (n,)
@@ -43,11 +63,16 @@ class Grid(NamedTuple):
         Cells per axis and first cell of each level.
     largest, cell_size : ndarray, shape (levels,)
         Largest radius and cell side of each level.
+    stride : ndarray, shape (2, levels)
+        How far a sphere of each level may get while the list lasts, m: of all but the fast ones, and of all.
+    horizon : int
+        Time steps that the list lasts at most.
     """
 
     length: float
     level: IntArray
     spheres: FloatArray
+    fast: np.ndarray[Any, np.dtype[np.bool_]]
     member: IntArray
     place: IntArray
     start: IntArray
@@ -55,6 +80,8 @@ class Grid(NamedTuple):
     offset: IntArray
     largest: FloatArray
     cell_size: FloatArray
+    stride: FloatArray
+    horizon: int
 
 
 class Pairs(NamedTuple):
@@ -64,6 +91,8 @@ class Pairs(NamedTuple):
     ----------
     bounds : ndarray, shape (threads + 1,)
         The spheres whose pairs each thread works on.
+    halo : ndarray, shape (threads, 2)
+        First and last but one of the spheres that each thread's pairs act on.
     first, last : ndarray, shape (n,)
         ``first[i]:last[i]`` are the pairs of sphere i.
     neighbour : ndarray, shape (m,)
@@ -72,21 +101,25 @@ class Pairs(NamedTuple):
         What of the contact law takes roots and does not change while the pair lasts.
     spring : ndarray, shape (m, 3)
         Tangential springs, m; one row without friction.
-    near_last : ndarray, shape (n,)
-        End of each sphere's near pairs; they begin where the sphere's before it end.
-    near_neighbour, near_constants : ndarray, shapes (m,), (m, 2)
-        As above, of the near pairs.
+    near_end : ndarray, shape (threads,)
+        End of the near pairs of each thread; they begin where its pairs do.
+    near_owner, near_neighbour : ndarray, shape (m,)
+        The sphere that a near pair is listed with, and the other as above.
+    near_constants : ndarray, shape (2, m + 8)
+        As above, of the near pairs; a whole vector may be read at the last.
     near_pair : ndarray, shape (m,)
         Which pair a near one is.
     """
 
     bounds: IntArray
+    halo: IntArray
     first: Unsigned
     last: Unsigned
     neighbour: Neighbours
     constants: FloatArray
     spring: FloatArray
-    near_last: Unsigned
+    near_end: Unsigned
+    near_owner: Neighbours
     near_neighbour: Neighbours
     near_constants: FloatArray
     near_pair: Neighbours
@@ -101,8 +134,8 @@ class Bodies(NamedTuple):
         Position, radius, velocity and mass: one sphere is one cache line.
     spin : ndarray, shape (n, 3)
         Angular velocity, rad/s.
-    force, torque : ndarray, shape (threads, n, 3)
-        One layer per thread; the first ends as the total.
+    force, torque : ndarray, shape (layers, n, 3)
+        The first is the total. With several threads each has one more, for what acts on the others' spheres.
     """
 
     state: FloatArray
@@ -132,22 +165,28 @@ class Floor(NamedTuple):
 class Listing(NamedTuple):
     """How far the spheres may move before the pairs are listed anew.
 
+    Every sphere has a straight course of its own and room to leave it: what rests needs little, what falls may go on
+    or be stopped, and few that fly about need not shorten the list of all.
+
     Attributes
     ----------
     reference : ndarray, shape (n, 3)
         Positions at which the pairs were listed, m.
+    course : ndarray, shape (n,)
+        Height that each is expected to gain per time step, m.
+    room : ndarray, shape (n,)
+        How far each may be from where that leads, m.
     watched : ndarray, shape (m,)
         Spheres that have neighbours which are not in the list.
-    skin : float
-        Gap up to which pairs are listed, m.
-    frame_step : float
-        What the frame in which movement is seen rises by per step, m: only relative movement opens or closes a pair.
+    horizon : int
+        Time steps that the list lasts at most.
     """
 
     reference: FloatArray
+    course: FloatArray
+    room: FloatArray
     watched: IntArray
-    skin: float
-    frame_step: float
+    horizon: int
 
 
 class Moment(NamedTuple):
@@ -159,13 +198,13 @@ class Moment(NamedTuple):
         Whether the forces at the positions are known.
     starting : bool
         Whether the velocities are those of the positions, not yet half a step back.
-    frame : float
-        What the frame has risen by since the pairs were listed, m.
+    since : int
+        Time steps since the pairs were listed.
     """
 
     ready: bool
     starting: bool
-    frame: float
+    since: int
 
 
 class Patches(NamedTuple):
@@ -195,11 +234,8 @@ class Law(NamedTuple):
     capped: bool = False
 
 
-# kinds of attraction
-NO_ATTRACTION, COHESION, ADHESION = range(3)
-
-# columns of the state
-X, Y, Z, RADIUS, U, V, W, MASS = range(8)
+ROOM, COURSE = 4, 5
+"""Columns of the grid's spheres, behind the radius."""
 
 NEAR_STEPS = 20
 """Time steps that the choice of near pairs lasts, unless a sphere becomes too fast for it."""
@@ -209,21 +245,12 @@ PATCH = 2**PATCH_SHIFT
 OWN_ROOM = 1.5
 COMMON_ROOM = 0.1
 """Limit of a patch's speeds: so many times its fastest sphere's, and so many times that of the whole bed's."""
-CLOSE_TO_LIMIT = 0.95
-"""Share of half a skin at which pairs are listed anew."""
-FUSED = {"contract"}
-"""Multiply and add in one instruction where the processor can; nothing else of floating-point law is relaxed."""
+LOCAL_ROOM = 0.6
+"""Part of the largest speed in its patch at which a sphere may leave its course for as long as a list lasts."""
+SURE_ROOM = 1.25
+"""Room over what a first choice of near pairs may need: a list that is new lasts at least that long."""
 
 _compiled = cached_njit(error_model="numpy", fastmath=FUSED)
-
-# indices are unsigned: signed ones cost a test for negative values at every access
-IMAGE_SHIFT = np.uint32(28)
-INDEX_MASK = np.uint32(2**28 - 1)
-SAME_IMAGE = np.uint32(4)
-"""Code of a neighbour in the box itself, not in one of its eight periodic images."""
-
-# columns of a pair's constants
-STIFFNESS, DAMPING = range(2)
 
 
 @cached_njit(error_model="numpy")
@@ -290,20 +317,30 @@ def sort_into_cells(
 
 
 @_compiled
-def _find_pairs(part: int, state: FloatArray, grid: Grid, skin: float, pairs: Pairs) -> int:
+def _find_pairs(part: int, state: FloatArray, grid: Grid, pairs: Pairs) -> int:
     """List the pairs of one part's spheres in its share of the list; return how many they are."""
     bounds, first, last, neighbour = pairs.bounds, pairs.first, pairs.last, pairs.neighbour
-    level, spheres, member, place, start = grid.level, grid.spheres, grid.member, grid.place, grid.start
+    level, spheres, fast, member, place, start = (
+        grid.level,
+        grid.spheres,
+        grid.fast,
+        grid.member,
+        grid.place,
+        grid.start,
+    )
     length, shape, offset, largest, cell_size = grid.length, grid.shape, grid.offset, grid.largest, grid.cell_size
-    room = neighbour.size // (bounds.size - 1)
+    parts = bounds.size - 1
+    room = neighbour.size // parts
     begin_at, last_slot = part * room, room - 1
     count = 0
     for i in range(bounds[part], bounds[part + 1]):
         first[i] = begin_at + count
         x, y, z, r = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
-        own = level[i]
-        for k in range(own + 1):
-            reach = r + largest[k] + skin
+        own, here = level[i], place[i]
+        is_fast, own_room, course = fast[here], spheres[here, ROOM], spheres[here, COURSE]
+        stride = own_room + grid.horizon * abs(course)
+        for k in range(shape.shape[0] if is_fast else own + 1):
+            reach = r + largest[k] + stride + grid.stride[1 if is_fast else 0, k]
             across, layers = shape[k, 0], shape[k, 2]
             inverse = across / length
             # one periodic image to either side: the next is a sphere's own width away and never touches
@@ -312,7 +349,7 @@ def _find_pairs(part: int, state: FloatArray, grid: Grid, skin: float, pairs: Pa
             y0 = max(math.floor((y - reach) * inverse), -across)
             y1 = min(math.floor((y + reach) * inverse), 2 * across - 1)
             # what lies in lower layers of the own level comes earlier and has listed the pair
-            z0 = _layer(z if k == own else z - reach, cell_size[k], layers)
+            z0 = _layer(z if k == own and not is_fast else z - reach, cell_size[k], layers)
             z1 = _layer(z + reach, cell_size[k], layers)
             for cz in range(z0, z1 + 1):
                 for cy in range(y0, y1 + 1):
@@ -324,15 +361,17 @@ def _find_pairs(part: int, state: FloatArray, grid: Grid, skin: float, pairs: Pa
                         left, right = max(x0, wrap_x * across), min(x1, wrap_x * across + across - 1)
                         xs = x - wrap_x * length
                         begin, end = start[row + left - wrap_x * across], start[row + right - wrap_x * across + 1]
-                        if k == own:
-                            begin = max(begin, place[i] + 1)  # each pair once
+                        if k == own and not is_fast:
+                            begin = max(begin, here + 1)  # each pair once
                         code = np.uint32((wrap_y + 1) * 3 + wrap_x + 1) << IMAGE_SHIFT
                         for j in range(np.uint64(begin), np.uint64(end)):
                             dx, dy, dz = xs - spheres[j, X], ys - spheres[j, Y], z - spheres[j, Z]
-                            near = r + spheres[j, RADIUS] + skin
+                            near = r + spheres[j, RADIUS] + own_room + spheres[j, ROOM]
+                            near += grid.horizon * abs(course - spheres[j, COURSE])
+                            mine = not fast[j] or (is_fast and j > here)
                             # written in any case and kept if near: a branch here is too often guessed wrongly
                             neighbour[begin_at + min(count, last_slot)] = np.uint32(member[j]) | code
-                            count += dx * dx + dy * dy + dz * dz < near * near
+                            count += (dx * dx + dy * dy + dz * dz < near * near) & mine & (j != here)
         last[i] = begin_at + count
     return count
 
@@ -342,8 +381,8 @@ def make_find_pairs(threaded: bool) -> Callable[..., int]:
     """Compile the search for pairs, for one thread or several."""
 
     @cached_njit(parallel=threaded)
-    def find_pairs(state: FloatArray, grid: Grid, skin: float, pairs: Pairs) -> int:
-        """List in ``pairs`` those closer than ``skin``, each once, by sphere (spheres sorted into cells).
+    def find_pairs(state: FloatArray, grid: Grid, pairs: Pairs) -> int:
+        """List in ``pairs`` those that may touch within the horizon, each once, by sphere (spheres sorted into cells).
 
         Each part of the spheres (``pairs.bounds``) has an equal share of the list to itself. Returns the largest number
         of pairs in one part: when it is more than a share holds, the list holds only a part of them.
@@ -351,7 +390,7 @@ def make_find_pairs(threaded: bool) -> Callable[..., int]:
         parts = pairs.bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
         counts = np.zeros(parts, dtype=np.int64)
         for t in prange(parts):
-            counts[t] = _find_pairs(t, state, grid, skin, pairs)
+            counts[t] = _find_pairs(t, state, grid, pairs)
         return int(counts.max())
 
     compiled: Callable[..., int] = find_pairs
@@ -359,11 +398,23 @@ def make_find_pairs(threaded: bool) -> Callable[..., int]:
 
 
 @cached_njit
-def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_ratio: float) -> None:
-    """Fill each pair's constants."""
+def find_halos(pairs: Pairs) -> None:
+    """Note the first and the last but one of the spheres that each part's pairs act on."""
+    for part in range(pairs.bounds.size - 1):
+        low, high = int(pairs.bounds[-1]), 0
+        for i in range(pairs.bounds[part], pairs.bounds[part + 1]):
+            for p in range(pairs.first[i], pairs.last[i]):
+                j = int(pairs.neighbour[p] & INDEX_MASK)
+                low, high = int(min(low, j)), int(max(high, j + 1))
+        pairs.halo[part, 0], pairs.halo[part, 1] = low, high
+
+
+@cached_njit
+def _pair_constants(part: int, state: FloatArray, pairs: Pairs, modulus: float, damping_ratio: float) -> None:
+    """Fill the constants of the pairs of one part's spheres."""
     first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
     damping = 2.0 * math.sqrt(5.0 / 6.0) * damping_ratio
-    for i in range(first.size):
+    for i in range(pairs.bounds[part], pairs.bounds[part + 1]):
         for p in range(first[i], last[i]):
             j = neighbour[p] & INDEX_MASK
             a, b = state[i, RADIUS], state[j, RADIUS]
@@ -371,6 +422,21 @@ def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_rati
             reduced = state[i, MASS] * state[j, MASS] / (state[i, MASS] + state[j, MASS])
             constants[p, STIFFNESS] = 4.0 / 3.0 * modulus * root
             constants[p, DAMPING] = damping * math.sqrt(2.0 * modulus * root * reduced)
+
+
+@cache
+def make_pair_constants(threaded: bool) -> Callable[..., None]:
+    """Compile the filling in of each pair's constants, for one thread or several."""
+
+    @cached_njit(parallel=threaded)
+    def pair_constants(state: FloatArray, pairs: Pairs, modulus: float, damping_ratio: float) -> None:
+        """Fill each pair's constants, from the effective modulus, Pa, and the damping ratio."""
+        parts = pairs.bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
+        for t in prange(parts):
+            _pair_constants(t, state, pairs, modulus, damping_ratio)
+
+    compiled: Callable[..., None] = pair_constants
+    return compiled
 
 
 @cached_njit
@@ -419,24 +485,46 @@ def _limit_speeds(state: FloatArray, patches: Patches) -> None:
 
 
 @_compiled
-def _apart(
-    x: float, y: float, z: float, state: FloatArray, neighbour: int, length: float
-) -> tuple[Any, float, float, float]:
-    """Return a neighbour's number, and the way from its nearest image to a place."""
-    j = neighbour & INDEX_MASK
-    code = neighbour >> IMAGE_SHIFT
-    dx, dy, dz = x - state[j, X], y - state[j, Y], z - state[j, Z]
-    if code != SAME_IMAGE:
-        dx -= (np.int64(code) % 3 - 1) * length
-        dy -= (np.int64(code) // 3 - 1) * length
-    return j, dx, dy, dz
+def give_room(state: FloatArray, law: Law, least: float, listing: Listing) -> None:
+    """Give every sphere a course and room to leave it, from how fast it and its neighbours are.
+
+    Half its present speed is the course of what may go on or be stopped. Nobody gets less room than ``least``, m, or
+    than the first choice of near pairs may need.
+    """
+    course, room = listing.course, listing.room
+    count = (state.shape[0] + PATCH - 1) // PATCH
+    patches = Patches(np.zeros(count), np.zeros(count))
+    _limit_speeds(state, patches)
+    lasts, first = listing.horizon * law.time_step, NEAR_STEPS * law.time_step
+    for i in range(state.shape[0]):
+        u, v, half = state[i, U], state[i, V], 0.5 * state[i, W]
+        limit, astray = patches.limit[i // PATCH], abs(patches.speed[i // PATCH] - half)
+        needed = lasts * (math.sqrt(u * u + v * v + half * half) + LOCAL_ROOM * limit)
+        course[i] = half * law.time_step
+        room[i] = max(least + needed, SURE_ROOM * first * (astray + limit))
 
 
 @_compiled
-def _pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law: Law) -> None:
+def _within_room(state: FloatArray, patches: Patches, listing: Listing, since: int, time_step: float) -> bool:
+    """Whether the list holds every pair that may touch before near pairs are chosen the next time."""
+    reference, course, room = listing.reference, listing.course, listing.room
+    if since + NEAR_STEPS > listing.horizon:
+        return False
+    within = True
+    for i in range(state.shape[0]):
+        x, y = state[i, X] - reference[i, 0], state[i, Y] - reference[i, 1]
+        z = state[i, Z] - reference[i, 2] - since * course[i]
+        astray = abs(patches.speed[i // PATCH] * time_step - course[i]) + patches.limit[i // PATCH] * time_step
+        left = max(room[i] - NEAR_STEPS * astray, 0.0)
+        within &= x * x + y * y + z * z <= left * left
+    return within
+
+
+@_compiled
+def pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law: Law) -> None:
     """Copy those of one part's pairs that may touch within ``NEAR_STEPS`` to the near ones."""
     first, last, neighbour, constants = pairs.first, pairs.last, pairs.neighbour, pairs.constants
-    near_last, near_neighbour = pairs.near_last, pairs.near_neighbour
+    near_owner, near_neighbour = pairs.near_owner, pairs.near_neighbour
     near_constants, near_pair = pairs.near_constants, pairs.near_pair
     patch_speed, patch_limit = patches.speed, patches.limit
     length, duration = law.length, NEAR_STEPS * law.time_step
@@ -449,28 +537,23 @@ def _pick_near(part: int, state: FloatArray, pairs: Pairs, patches: Patches, law
         own_speed = patch_speed[i // PATCH]
         r = state[i, RADIUS] + duration * patch_limit[i // PATCH]
         for p in range(first[i], last[i]):
-            j, dx, dy, dz = _apart(x, y, z, state, neighbour[p], length)
+            j, code = neighbour[p] & INDEX_MASK, neighbour[p] >> IMAGE_SHIFT
+            dx, dy, dz = x - state[j, X], y - state[j, Y], z - state[j, Z]
+            if code != SAME_IMAGE:
+                dx -= (np.int64(code) % 3 - 1) * length
+                dy -= (np.int64(code) // 3 - 1) * length
             patch = j >> PATCH_SHIFT
             approach = patch_limit[patch] + abs(own_speed - patch_speed[patch])
             touching = r + state[j, RADIUS] + duration * approach
             # written in any case and kept if near: a branch here is too often guessed wrongly
             near_pair[q] = p
+            near_owner[q] = i
             q += np.uint64(dx * dx + dy * dy + dz * dz < touching * touching)
-        near_last[i] = q
+    pairs.near_end[part] = q
     for k in range(first[begin], q):
         near_neighbour[k] = neighbour[near_pair[k]]
-        near_constants[k, STIFFNESS] = constants[near_pair[k], STIFFNESS]
-        near_constants[k, DAMPING] = constants[near_pair[k], DAMPING]
-
-
-@_compiled
-def _farthest(state: FloatArray, reference: FloatArray, frame: float) -> float:
-    """Return the largest distance from the reference in a frame that has risen by ``frame``, m."""
-    farthest = 0.0
-    for i in range(state.shape[0]):
-        x, y, z = state[i, X] - reference[i, 0], state[i, Y] - reference[i, 1], state[i, Z] - reference[i, 2] - frame
-        farthest = max(farthest, x * x + y * y + z * z)
-    return math.sqrt(farthest)
+        near_constants[0, k] = constants[near_pair[k], STIFFNESS]
+        near_constants[1, k] = constants[near_pair[k], DAMPING]
 
 
 @_compiled
@@ -496,126 +579,31 @@ def _limit_force(px: float, py: float, pz: float, allowed: float) -> tuple[float
 
 
 @cached_njit
-def _share(part: int, bodies: Bodies) -> range:
-    """Return the spheres that one thread moves."""
-    parts, n = bodies.force.shape[0], bodies.state.shape[0]
-    return range(part * n // parts, (part + 1) * n // parts)
-
-
-@cached_njit
-def _clear(part: int, bodies: Bodies, gravity: float, frictional: bool) -> None:
-    """Set one layer of the forces and torques to nothing but, in the first, the spheres' weight."""
-    force, torque = bodies.force[part], bodies.torque[part]
-    for i in range(bodies.state.shape[0]):
+def _clear(part: int, bodies: Bodies, pairs: Pairs, gravity: float, frictional: bool) -> None:
+    """Set the forces and torques on one part's spheres to nothing but their weight."""
+    force, torque = bodies.force[0], bodies.torque[0]
+    for i in range(pairs.bounds[part], pairs.bounds[part + 1]):
         force[i, 0] = force[i, 1] = 0.0
-        force[i, 2] = -gravity * bodies.state[i, MASS] if part == 0 else 0.0
+        force[i, 2] = -gravity * bodies.state[i, MASS]
         if frictional:
             torque[i, 0] = torque[i, 1] = torque[i, 2] = 0.0
 
 
 @cached_njit
-def _add_layers(part: int, bodies: Bodies, frictional: bool) -> None:
-    """Move the forces and torques on one part's spheres from the other layers to the first."""
-    force, torque = bodies.force, bodies.torque
-    for i in _share(part, bodies):
-        for other in range(1, force.shape[0]):
+def _add_layers(part: int, bodies: Bodies, pairs: Pairs, frictional: bool) -> None:
+    """Move the forces and torques on one part's spheres from the other parts' layers to the first."""
+    force, torque, bounds, halo = bodies.force, bodies.torque, pairs.bounds, pairs.halo
+    for other in range(bounds.size - 1):
+        if other == part:
+            continue
+        layer = other + 1
+        for i in range(max(bounds[part], halo[other, 0]), min(bounds[part + 1], halo[other, 1])):
             for k in range(3):
-                force[0, i, k] += force[other, i, k]
-                force[other, i, k] = 0.0
+                force[0, i, k] += force[layer, i, k]
+                force[layer, i, k] = 0.0
                 if frictional:
-                    torque[0, i, k] += torque[other, i, k]
-                    torque[other, i, k] = 0.0
-
-
-@_compiled
-def pair_forces(
-    part: int, bodies: Bodies, pairs: Pairs, law: Law, spring_step: float, attraction: int, frictional: bool
-) -> None:
-    """Add the forces and torques of the pairs of one part's spheres to its layers."""
-    literally(attraction), literally(frictional)  # compiled for each kind: what it doesn't need is not in its code
-    state, spin, force, torque = bodies.state, bodies.spin, bodies.force[part], bodies.torque[part]
-    last, neighbour, constants = pairs.near_last, pairs.near_neighbour, pairs.near_constants
-    spring, pair, length = pairs.spring, pairs.near_pair, law.length
-    lens_factor, pull_factor = 0.25 * math.pi * law.cohesion, 1.5 * math.pi * law.adhesion
-    begin, end = pairs.bounds[part], pairs.bounds[part + 1]
-    stop = pairs.first[begin] if begin < end else np.uint64(0)
-    for i in range(begin, end):
-        start, stop = stop, last[i]
-        xi, yi, zi, ri = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
-        ui, vi, wi = state[i, U], state[i, V], state[i, W]
-        fx, fy, fz = 0.0, 0.0, 0.0
-        tx, ty, tz = 0.0, 0.0, 0.0
-        for q in range(start, stop):
-            j, dx, dy, dz = _apart(xi, yi, zi, state, neighbour[q], length)
-            square = dx * dx + dy * dy + dz * dz
-            rj = state[j, RADIUS]
-            total = ri + rj
-            if square >= total * total:
-                if frictional:
-                    spring[pair[q], 0] = spring[pair[q], 1] = spring[pair[q], 2] = 0.0
-                continue
-            r = math.sqrt(square)
-            inverse = 1.0 / r
-            overlap = total - r
-            root = math.sqrt(overlap)
-            quarter = math.sqrt(root)
-            du, dv, dw = ui - state[j, U], vi - state[j, V], wi - state[j, W]
-            normal_speed = (du * dx + dv * dy + dw * dz) * inverse
-            normal = constants[q, STIFFNESS] * overlap * root - constants[q, DAMPING] * quarter * normal_speed
-            push = normal
-            if attraction == COHESION:
-                lens = overlap * (total + r) * (square - (ri - rj) * (ri - rj))
-                push -= lens_factor * lens * (inverse * inverse)
-            if attraction == ADHESION:
-                push -= pull_factor * (ri * rj / total)
-            push *= inverse
-            gx, gy, gz = push * dx, push * dy, push * dz
-            if frictional:
-                nx, ny, nz = dx * inverse, dy * inverse, dz * inverse
-                arm_i, arm_j = ri - 0.5 * overlap, rj - 0.5 * overlap
-                ox = arm_i * spin[i, 0] + arm_j * spin[j, 0]
-                oy = arm_i * spin[i, 1] + arm_j * spin[j, 1]
-                oz = arm_i * spin[i, 2] + arm_j * spin[j, 2]
-                sx = du - normal_speed * nx - (nz * oy - ny * oz)
-                sy = dv - normal_speed * ny - (nx * oz - nz * ox)
-                sz = dw - normal_speed * nz - (ny * ox - nx * oy)
-                hx = spring[pair[q], 0] + sx * spring_step
-                hy = spring[pair[q], 1] + sy * spring_step
-                hz = spring[pair[q], 2] + sz * spring_step
-                along = hx * nx + hy * ny + hz * nz
-                stiffness = law.shear_stiffness * constants[q, STIFFNESS] * root
-                allowed = law.friction * abs(normal)
-                hx, hy, hz, slides = _limit_spring(
-                    hx - along * nx, hy - along * ny, hz - along * nz, stiffness, allowed
-                )
-                drag = 0.0 if slides else law.shear_damping * constants[q, DAMPING] * quarter
-                px, py, pz = -stiffness * hx - drag * sx, -stiffness * hy - drag * sy, -stiffness * hz - drag * sz
-                if law.capped and not slides:
-                    px, py, pz = _limit_force(px, py, pz, allowed)
-                spring[pair[q], 0], spring[pair[q], 1], spring[pair[q], 2] = hx, hy, hz
-                gx += px
-                gy += py
-                gz += pz
-                mx, my, mz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-                tx -= arm_i * mx
-                ty -= arm_i * my
-                tz -= arm_i * mz
-                torque[j, 0] -= arm_j * mx
-                torque[j, 1] -= arm_j * my
-                torque[j, 2] -= arm_j * mz
-            fx += gx
-            fy += gy
-            fz += gz
-            force[j, 0] -= gx
-            force[j, 1] -= gy
-            force[j, 2] -= gz
-        force[i, 0] += fx
-        force[i, 1] += fy
-        force[i, 2] += fz
-        if frictional:
-            torque[i, 0] += tx
-            torque[i, 1] += ty
-            torque[i, 2] += tz
+                    torque[0, i, k] += torque[layer, i, k]
+                    torque[layer, i, k] = 0.0
 
 
 @_compiled
@@ -661,18 +649,17 @@ def _floor_forces(
 
 @_compiled
 def _move(
-    part: int, bodies: Bodies, patches: Patches, kick: float, frame_speed: float, law: Law, frictional: bool
-) -> tuple[float, bool]:
+    part: int, bodies: Bodies, bounds: IntArray, patches: Patches, kick: float, law: Law, frictional: bool
+) -> bool:
     """Kick and move one part's spheres, and leave their weight in the total force for the next step to add to.
 
-    ``kick`` is the time, s, that the force has acted. Returns the largest squared speed in the frame, and whether
-    a sphere was faster than its patch may be.
+    ``kick`` is the time, s, that the force has acted. Returns whether a sphere was faster than its patch may be.
     """
     literally(frictional)
     state, spin, force, torque = bodies.state, bodies.spin, bodies.force[0], bodies.torque[0]
     gravity, time_step = law.gravity, law.time_step
-    fastest, too_fast = 0.0, False
-    for i in _share(part, bodies):
+    too_fast = False
+    for i in range(bounds[part], bounds[part + 1]):
         patch = i // PATCH
         scale = kick / state[i, MASS]
         u = state[i, U] + scale * force[i, 0]
@@ -688,11 +675,10 @@ def _move(
             for k in range(3):
                 spin[i, k] += turn * torque[i, k]
                 torque[i, k] = 0.0
-        sideways = u * u + v * v
-        rising, own = w - frame_speed, w - patches.speed[patch]
-        fastest = max(fastest, sideways + rising * rising)
-        too_fast |= sideways + own * own > patches.limit[patch] * patches.limit[patch]
-    return fastest, too_fast
+        own = w - patches.speed[patch]
+        # not the other way round: what is no number is too fast
+        too_fast |= not u * u + v * v + own * own <= patches.limit[patch] * patches.limit[patch]
+    return too_fast
 
 
 @cached_njit
@@ -718,57 +704,51 @@ def make_advance(attraction: int, frictional: bool, threaded: bool) -> Callable[
     ) -> tuple[int, bool]:
         """Advance up to ``steps``.
 
-        It stops early, forces unknown, when a sphere may have moved by half a skin since the pairs were listed (real
-        distances are taken only when the sum of the largest speeds says so), or when one of the ``watched`` spheres
-        has been touched.
+        It stops early, forces unknown, when a pair may soon touch that is not listed, or when one of the ``watched``
+        spheres has been touched.
 
         Returns
         -------
         Steps done, and whether the forces at the new positions are known.
         """
-        ready, starting, frame = moment
-        state = bodies.state
-        parts = pairs.bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
-        limit, time_step = 0.5 * listing.skin, law.time_step
-        frame_speed = listing.frame_step / time_step
-        drift, near_enough = _farthest(state, listing.reference, frame), True
-        speed, too_fast = np.zeros(parts), np.zeros(parts, dtype=np.bool_)
+        ready, starting, since = moment
+        state, bounds, time_step = bodies.state, pairs.bounds, law.time_step
+        parts = bounds.size - 1 if threaded else 1  # named here, or the cache mixes up the two kinds
+        too_fast = np.zeros(parts, dtype=np.bool_)
         count = (state.shape[0] + PATCH - 1) // PATCH
         patches = Patches(np.zeros(count), np.full(count, np.inf))
         done, picked = 0, 0  # picked: steps that the choice of near pairs will last yet
         if not ready:
             for t in prange(parts):
-                _clear(t, bodies, law.gravity, frictional)
+                _clear(t, bodies, pairs, law.gravity, frictional)
         while True:
             if not ready:
                 if picked == 0:
                     picked = NEAR_STEPS
                     _limit_speeds(state, patches)
+                    if not _within_room(state, patches, listing, since, time_step):
+                        return done, ready
                     for t in prange(parts):
-                        _pick_near(t, state, pairs, patches, law)
+                        pick_near(t, state, pairs, patches, law)
                 spring_step = 0.0 if starting else time_step  # at the start the springs know the positions
                 for t in prange(parts):
-                    pair_forces(t, bodies, pairs, law, spring_step, attraction, frictional)
+                    pair_kernels.pair_forces(t, bodies, pairs, law, spring_step, attraction, frictional)
                 if parts > 1:
                     for t in prange(parts):
-                        _add_layers(t, bodies, frictional)
+                        _add_layers(t, bodies, pairs, frictional)
                 _floor_forces(floor, bodies, law, spring_step, attraction, frictional)
                 ready = True
             if done == steps:
                 return done, ready
             kick = 0.5 * time_step if starting else time_step
             starting = False
-            frame += listing.frame_step
             for t in prange(parts):
-                speed[t], too_fast[t] = _move(t, bodies, patches, kick, frame_speed, law, frictional)
+                too_fast[t] = _move(t, bodies, bounds, patches, kick, law, frictional)
             picked = 0 if too_fast.any() else max(picked - 1, 0)
-            drift += math.sqrt(speed.max()) * time_step  # none has moved farther
-            if not drift < limit:
-                drift = _farthest(state, listing.reference, frame)
-                near_enough = drift < CLOSE_TO_LIMIT * limit
             done += 1
+            since += 1
             ready = False
-            if not near_enough or not abs(frame) < limit or _disturbed(state, listing.watched):
+            if _disturbed(state, listing.watched):
                 return done, ready
 
     compiled: Callable[..., tuple[int, bool]] = advance

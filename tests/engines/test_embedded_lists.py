@@ -1,0 +1,127 @@
+"""The lists of pairs of the embedded engine: none that touches is missing, however spheres move."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from filtercake.crystals.csd import CrystalSizeDistribution, mixture
+from filtercake.packing.cloud import make_cloud
+from filtercake.packing.engines import embedded_bed, pair_kernels
+from filtercake.packing.engines.embedded_bed import Bed
+from filtercake.packing.scene import Scene
+
+
+def scene_of(csd, particles, **changed):
+    values = {
+        "initial_void_fraction": 0.65,
+        "settling_velocity": 0.01,
+        "density": 1180.0,
+        "youngs_modulus": 5e6,
+        "poisson_ratio": 0.2,
+        "restitution": 0.9,
+        "friction": 0.0,
+        "cohesion": 0.0,
+        "time_step": 1e-7,
+        "engine": "embedded",
+    }
+    return Scene(csd=csd, particles=particles, **{**values, **changed}).with_time_step(changed.get("fraction", 0.3))
+
+
+def touching(bed):
+    """Pairs of spheres of the bed whose surfaces overlap, by an independent search."""
+    n, length = bed.count, bed.length
+    place = bed.position[:n].copy()
+    place[:, :2] %= length
+    place[place[:, :2].max(axis=1) >= length, :2] = 0.0
+    high = 10.0 * (abs(place[:, 2]).max() + length)
+    place[:, 2] += 0.5 * high
+    tree = cKDTree(place, boxsize=[length, length, high])
+    found = set()
+    for i, j in tree.query_pairs(2.0 * bed.radius[:n].max()):
+        away = place[i] - place[j]
+        away[:2] -= length * np.round(away[:2] / length)
+        if away @ away < (bed.radius[i] + bed.radius[j]) ** 2:
+            found.add((i, j))
+    return found
+
+
+def near(bed):
+    """Pairs that the time loop works on at present."""
+    pairs, found = bed.pairs, set()
+    for part in range(bed.threads):
+        begin = pairs.bounds[part]
+        if begin == pairs.bounds[part + 1]:
+            continue
+        here = slice(int(pairs.first[begin]), int(pairs.near_end[part]))
+        other = pairs.near_neighbour[here] & pair_kernels.INDEX_MASK
+        found |= {(min(a, b), max(a, b)) for a, b in zip(pairs.near_owner[here].tolist(), other.tolist(), strict=True)}
+    return found
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_every_contact_of_a_falling_bed_is_listed(friction, threads):
+    scene = scene_of(mixture([10e-6, 50e-6], [0.5, 0.5]), 1500, friction=friction, settling_velocity=0.3)
+    cloud = make_cloud(scene.csd, 1500, 0.65, 1)
+    bed = Bed.from_cloud(cloud, scene, threads)
+    seen = 0
+    for steps in np.random.default_rng(1).integers(1, 170, size=60):
+        bed.advance(int(steps))
+        if bed.count:
+            contacts = touching(bed)
+            assert contacts <= near(bed)
+            seen += len(contacts)
+    assert seen > 1000
+
+
+@given(speed=st.floats(0.05, 3.0), seed=st.integers(0, 1000), size=st.sampled_from([10e-6, 20e-6, 50e-6]))
+@settings(max_examples=15)
+def test_a_bullet_through_a_cloud_at_rest_meets_what_it_meets(speed, seed, size):
+    scene = scene_of(mixture([20e-6, 50e-6], [0.5, 0.5]), 300)
+    cloud = make_cloud(scene.csd, 300, 0.65, seed)
+    position = np.vstack([cloud.position, [0.5 * cloud.length, 0.5 * cloud.length, -60e-6]])
+    velocity = np.zeros_like(position)
+    velocity[-1] = [0.3 * speed, 0.1 * speed, speed]
+    scene = scene_of(CrystalSizeDistribution.from_classes([10e-6], [1.0]), 301)
+    position[:, 2] += 500e-6
+    bed = Bed(position, velocity, np.append(cloud.radius, 0.5 * size), cloud.length, scene, 0.0)
+    for _ in range(25):
+        bed.advance(37)
+        assert touching(bed) <= near(bed)
+
+
+def test_few_that_fly_about_do_not_shorten_the_list_of_those_at_rest():
+    side, n = 400e-6, 8
+    grid = (np.array([(x, y, z) for z in range(n) for y in range(n) for x in range(n)]) + 0.5) * side / n
+    position = np.vstack([grid, [0.5 * side, 0.5 * side, 2.0 * side]])
+    velocity = np.zeros_like(position)
+    velocity[-1, 0] = 1.0
+    scene = scene_of(CrystalSizeDistribution.from_classes([40e-6], [1.0]), len(position))
+    bed = Bed(position, velocity, np.full(len(position), 20e-6), side, scene, gravity=0.0)
+    bed.advance(1)
+    bed.advance(embedded_bed.LISTING_STEPS // 2)
+    assert bed.listed_at == 0 and bed.room[:-1].max() < 0.1 * bed.room.max()
+    assert np.abs(bed.velocity[-1, 0] * bed.step * scene.time_step) > bed.room[:-1].max()
+
+
+def test_parts_give_their_forces_to_the_spheres_of_the_others():
+    side, n = 400e-6, 10
+    rng = np.random.default_rng(1)
+    grid = (np.array([(x, y, z) for z in range(n) for y in range(n) for x in range(n)]) + 0.5) * side / n
+    scene = scene_of(CrystalSizeDistribution.from_classes([40e-6], [1.0]), n**3, friction=0.2, cohesion=2e4)
+    velocity = rng.uniform(-0.01, 0.01, grid.shape)
+    one, two = (
+        Bed(grid, velocity, np.full(n**3, 20.05e-6), side, scene, gravity=0.0, threads=threads) for threads in (1, 2)
+    )
+    for bed in (one, two):
+        bed.spin[:] = np.random.default_rng(2).uniform(-300.0, 300.0, grid.shape)
+        bed.advance(25)
+    assert not two.force[1:].any() and not two.torque[1:].any()
+    for name in ("spheres", "spin", "force", "torque"):
+        first, other = (
+            (getattr(bed, name)[0] if name in ("force", "torque") else getattr(bed, name))[np.argsort(bed.identity)]
+            for bed in (one, two)
+        )
+        assert np.allclose(first, other, rtol=1e-7, atol=1e-9 * np.abs(first).max()), name
