@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -84,16 +85,16 @@ def lens_volume(contacts: Contacts, radius: FloatArray) -> FloatArray:
 
 
 def lens_volume_below(
-    height: float, contacts: Contacts, position: FloatArray, radius: FloatArray, length: float
-) -> float:
-    """Volume below a horizontal plane that pairs of spheres share, m3, summed over all pairs.
+    heights: FloatArray, contacts: Contacts, position: FloatArray, radius: FloatArray, length: float
+) -> FloatArray:
+    """Volume below horizontal planes that pairs of spheres share, m3, summed over all pairs, shape (k,).
 
-    Lenses that the plane cuts are integrated over height, with the area that two circles share in closed form.
+    Lenses that a plane cuts are integrated over height, with the area that two circles share in closed form.
 
     Parameters
     ----------
-    height : float
-        Height of the plane, m.
+    heights : ndarray, shape (k,)
+        Heights of the planes, m.
     contacts : Contacts
         The overlapping pairs.
     position, radius : ndarray, shapes (n, 3) and (n,)
@@ -106,19 +107,37 @@ def lens_volume_below(
     apart[:, :2] -= length * np.round(apart[:, :2] / length)
     top = position[i, 2] + _lens_top(apart, radius[i], radius[j])
     bottom = position[i, 2] - _lens_top(apart * [1.0, 1.0, -1.0], radius[i], radius[j])
-    whole = lens_volume(contacts, radius)[top <= height].sum()
-    cut = (bottom < height) & (height < top)
-    if not cut.any():
-        return float(whole)
-    i, j, bottom, side = i[cut], j[cut], bottom[cut], apart[cut, :2]
+    lens = lens_volume(contacts, radius)
+    found = np.empty(heights.size)
+    for k, height in enumerate(heights):
+        cut = (bottom < height) & (height < top)
+        found[k] = lens[top <= height].sum()
+        if cut.any():
+            spheres = [(radius[of[cut]] ** 2, position[of[cut], 2]) for of in (i, j)]
+            found[k] += _cut_lenses(height, bottom[cut], spheres, np.sum(apart[cut, :2] ** 2, axis=1))
+    return found
+
+
+def _cut_lenses(
+    height: float, bottom: FloatArray, spheres: list[tuple[FloatArray, FloatArray]], sideways: FloatArray
+) -> float:
+    """Volume of lenses between their lowest points and a height, from squared radii and heights of their spheres."""
     # z = middle - half cos(t): the square roots at both ends of a lens become smooth
-    angle, weight = np.polynomial.legendre.leggauss(NODES)
-    angle, weight = 0.5 * np.pi * (angle + 1.0), 0.5 * np.pi * weight
+    angle, weight = _quadrature()
     half = 0.5 * (height - bottom)[:, np.newaxis]
     z = bottom[:, np.newaxis] + half * (1.0 - np.cos(angle))
-    squares = [np.maximum(radius[k, np.newaxis] ** 2 - (z - position[k, 2, np.newaxis]) ** 2, 0.0) for k in (i, j)]
-    area = shared_area(squares[0], squares[1], np.sum(side**2, axis=1)[:, np.newaxis])
-    return float(whole + np.sum(half * np.sin(angle) * area * weight))
+    first, second = (
+        np.maximum(square[:, np.newaxis] - (z - centre[:, np.newaxis]) ** 2, 0.0) for square, centre in spheres
+    )
+    area = shared_area(first, second, sideways[:, np.newaxis])
+    return float(np.sum(half * np.sin(angle) * area * weight))
+
+
+@cache
+def _quadrature() -> tuple[FloatArray, FloatArray]:
+    """Angles from 0 to pi, and weights, of Gauss and Legendre."""
+    angle, weight = np.polynomial.legendre.leggauss(NODES)
+    return 0.5 * np.pi * (angle + 1.0), 0.5 * np.pi * weight
 
 
 def _lens_top(apart: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:

@@ -89,13 +89,8 @@ def porosity_profile(position: FloatArray, radius: FloatArray, length: float, ed
     Positions (n, 3), radii (n,), the side of the periodic box and the ascending edges in m.
     """
     contacts = find_contacts(position, radius, length)
-    below = np.array(
-        [
-            volume_below(edge, position[:, 2], radius).sum()
-            - lens_volume_below(edge, contacts, position, radius, length)
-            for edge in edges
-        ]
-    )
+    spheres = np.array([volume_below(edge, position[:, 2], radius).sum() for edge in edges])
+    below = spheres - lens_volume_below(edges, contacts, position, radius, length)
     return np.asarray(1.0 - np.diff(below) / (length**2 * np.diff(edges)))
 
 

@@ -84,7 +84,7 @@ def test_a_sphere_inside_another_is_shared_whole() -> None:
     found = find_contacts(position, radius, 9.0)
     small = 4.0 / 3.0 * np.pi * 0.2**3
     assert lens_volume(found, radius) == pytest.approx([small])
-    assert lens_volume_below(2.1, found, position, radius, 9.0) == pytest.approx(small / 2.0, rel=1e-9)
+    assert lens_volume_below(np.array([2.1]), found, position, radius, 9.0)[0] == pytest.approx(small / 2.0, rel=1e-9)
 
 
 @given(
@@ -104,12 +104,12 @@ def test_lenses_below_a_plane(size: float, overlap: float, tilt: float, turn: fl
     whole = lens_volume(found, radius)[0]
     top = (position[:, 2] + radius).min()
     bottom = (position[:, 2] - radius).max()
-    assert lens_volume_below(top, found, position, radius, 9.0) == pytest.approx(whole, rel=1e-12)
-    assert lens_volume_below(bottom, found, position, radius, 9.0) == 0.0
+    assert lens_volume_below(np.array([top]), found, position, radius, 9.0)[0] == pytest.approx(whole, rel=1e-12)
+    assert lens_volume_below(np.array([bottom]), found, position, radius, 9.0)[0] == 0.0
     height = bottom + share * (top - bottom)
-    below = lens_volume_below(height, found, position, radius, 9.0)
+    below = lens_volume_below(np.array([height]), found, position, radius, 9.0)[0]
     mirrored = position * [1.0, 1.0, -1.0] + [0.0, 0.0, 10.0]
-    above = lens_volume_below(10.0 - height, found, mirrored, radius, 9.0)
+    above = lens_volume_below(np.array([10.0 - height]), found, mirrored, radius, 9.0)[0]
     assert below + above == pytest.approx(whole, rel=1e-3, abs=1e-12)
 
 
@@ -117,6 +117,7 @@ def test_lenses_across_the_edge_of_the_periodic_box() -> None:
     radius = np.full(2, 0.5)
     position = np.array([[0.1, 2.0, 1.0], [3.9, 2.0, 1.3]])
     moved = (position + np.array([1.0, 0.0, 0.0])) % 4.0
-    volumes = [lens_volume_below(1.2, find_contacts(p, radius, 4.0), p, radius, 4.0) for p in (position, moved)]
+    plane = np.array([1.2])
+    volumes = [lens_volume_below(plane, find_contacts(p, radius, 4.0), p, radius, 4.0)[0] for p in (position, moved)]
     assert volumes[0] > 0.0
     assert volumes[0] == pytest.approx(volumes[1], rel=1e-12)
