@@ -175,9 +175,9 @@ speed: setup ## the engines against the paper's protocol and, where its wheel ca
 	install -m 644 results/benchmark/speed_*.csv results/benchmark/timings_*.csv docs/data/
 	$(BENCHMARK_PAGE)
 
-growth: setup ## the embedded engine's time per sphere and step against N and size ratio: docs/benchmark.md (about 10 min; leave the machine alone)
+growth: setup ## the embedded engine's time per sphere and step against N, size ratio and threads, up to a million spheres: docs/benchmark.md (about 20 min; leave the machine alone)
 	$(SNAKEMAKE) growth
-	install -m 644 results/benchmark/growth.csv docs/data/
+	install -m 644 results/benchmark/growth.csv results/benchmark/large_beds.csv results/benchmark/whole_bed.csv docs/data/
 	install -m 644 results/benchmark/growth.png docs/images/
 	$(BENCHMARK_PAGE)
 

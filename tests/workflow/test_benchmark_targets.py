@@ -15,7 +15,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 JOBS = {
     "agreement": ["compare_engines", "replicates", "packing", "csd"],
     "speed": ["time_in_turn"],
-    "growth": ["time_growth"],
+    "growth": ["time_growth", "time_large_beds"],
     "reference": ["gather_references"],
     "benchmark": ["time_variants", "choices", "answers", "coverage", "benchmark_page"],
     "stability": ["stress", "stability_page"],

@@ -300,6 +300,7 @@ rule time_in_turn:
 rule growth:
     input:
         expand("{results}/benchmark/growth.csv", results=RESULTS),
+        expand("{results}/benchmark/large_beds.csv", results=RESULTS),
     localrule: True
 
 
@@ -336,6 +337,35 @@ rule time_growth:
         "timing the embedded engine's growth"
     script:
         "../scripts/growth.py"
+
+
+rule time_large_beds:
+    output:
+        beds="{results}/benchmark/large_beds.csv",
+        hours="{results}/benchmark/whole_bed.csv",
+    log:
+        "{results}/benchmark/logs/large_beds.log",
+    benchmark:
+        "{results}/benchmark/benchmarks/large_beds.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    # alone on the machine: nothing else may run while it times
+    threads: workflow.cores
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        library=library("validation.large_beds"),
+        study=str(ROOT / "config" / "studies" / "pmma.yaml"),
+        csd="pmma_50_50",
+        # laid out once, twice along each axis, five times: 40 000 to a million
+        particles=40_000,
+        tiles=[1, 2, 5],
+        steps=1000,
+    message:
+        "timing large beds on one and two threads"
+    script:
+        "../scripts/large_beds.py"
 
 
 # reference ensembles: hours of LIGGGHTS, whose packings' table is kept in docs/data
