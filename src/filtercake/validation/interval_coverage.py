@@ -1,0 +1,135 @@
+"""Whether intervals asked for hold what they are of, and how many packings they take, by two rules."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from filtercake.packing.engines import ENGINES
+from filtercake.packing.pack import Report
+from filtercake.packing.replication import UntilNarrow
+from filtercake.packing.scene import Scene
+from filtercake.statistics import half_width, quantile
+from filtercake.validation.error_against_time import Reference
+from filtercake.validation.timing import Contender, settle_timed
+
+SEED: Final = 3001
+"""Seeds from which an interval is asked for: neither the default's nor the reference's, nor those of fitted spreads."""
+MOST: Final = 64
+COLUMNS: Final = ("case", "rule", "repeat", "n", "porosity", "half_width", "reached", "covered", "seconds")
+KNOWN, ALONE = "known spread", "its packings alone"
+"""The rule of :class:`filtercake.packing.replication.UntilNarrow`, and that of :class:`Alone`."""
+
+
+class Alone:
+    """The rule that took a point's packings alone: six at least, and Student's interval narrow after two on end."""
+
+    least, on_end = 6, 2
+
+    def __init__(self, interval: float):
+        """Ask for a half-width of the 95 % interval of the mean."""
+        self.interval, self.narrow = interval, 0
+        self.values: list[float] = []
+
+    def add(self, porosity: float) -> bool:
+        """Take one more porosity into account; say whether that is enough."""
+        self.values.append(porosity)
+        self.narrow = self.narrow + 1 if self.half_width <= self.interval else 0
+        return len(self.values) >= self.least and self.narrow >= self.on_end
+
+    @property
+    def half_width(self) -> float:
+        """Half-width of Student's interval so far."""
+        return half_width(self.values)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked for: a case's scene, its true porosity, and the half-width of its interval."""
+
+    case: str
+    scene: Scene
+    reference: Reference
+    interval: float
+
+
+def coverage(asked: Asked, repeats: int, report: Report = lambda _: None) -> pd.DataFrame:
+    """Ask for an interval again and again, from other seeds, and see how often it holds the reference.
+
+    Both rules are shown the same packings, each until it has enough.
+
+    Returns
+    -------
+    DataFrame
+        Columns ``COLUMNS``: rule, number of packings, mean and half-width, whether the half-width asked for was
+        reached, whether the reference lies within half-width and its own uncertainty of the mean, seconds of packing.
+    """
+    rows = []
+    for repeat in range(repeats):
+        scene = replace(asked.scene, seed=SEED + repeat)
+        made = Contender(scene.engine, scene, ENGINES[scene.engine]())
+        waiting: dict[str, UntilNarrow | Alone] = {
+            KNOWN: UntilNarrow(scene, asked.interval),
+            ALONE: Alone(asked.interval),
+        }
+        seconds = 0.0
+        for replicate in range(MOST):
+            found = settle_timed(made, replicate)
+            seconds += found["wall_s"]
+            if found["status"] != "ok":
+                continue
+            for name, rule in list(waiting.items()):
+                if rule.add(found["porosity"]) or replicate == MOST - 1:
+                    rows.append(_row(asked, rule, case=asked.case, rule=name, repeat=repeat, seconds=seconds))
+                    del waiting[name]
+            if not waiting:
+                break
+        counts = ", ".join(f"{row['n']} packings ({row['rule']})" for row in rows[-2:])
+        report(f"{asked.case}, repeat {repeat}: {counts}")
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _row(asked: Asked, found: UntilNarrow | Alone, **place: Any) -> dict[str, Any]:
+    mean, half = float(np.mean(found.values)), found.half_width
+    unsure = math.hypot(half, quantile(asked.reference.freedom) * asked.reference.standard_error)
+    return {
+        **place,
+        "n": len(found.values),
+        "porosity": mean,
+        "half_width": half,
+        "reached": half <= asked.interval,
+        "covered": abs(mean - asked.reference.porosity) <= unsure,
+    }
+
+
+def summary(table: pd.DataFrame) -> pd.DataFrame:
+    """Summarise coverage by case and rule.
+
+    Returns
+    -------
+    DataFrame
+        Columns case, rule, repeats, met (reached and covered), least, most and mean number of packings, porosity (mean
+        over the repeats) and its 95 % half-width, seconds (mean).
+    """
+    rows = []
+    for (case, rule), group in table.groupby(["case", "rule"], sort=False):
+        count = group["n"]
+        rows.append(
+            {
+                "case": case,
+                "rule": rule,
+                "repeats": len(group),
+                "met": int((group["covered"] & group["reached"]).sum()),
+                "least": int(count.min()),
+                "most": int(count.max()),
+                "mean": float(count.mean()),
+                "porosity": float(group["porosity"].mean()),
+                "porosity_ci95": half_width(group["porosity"]),
+                "seconds": float(group["seconds"].mean()),
+            }
+        )
+    return pd.DataFrame(rows)
