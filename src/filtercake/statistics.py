@@ -7,6 +7,7 @@ of their differences. What cannot be known, such as the spread of a single value
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -161,6 +162,7 @@ def pooled_spread(samples: Iterable[ArrayLike]) -> Spread:
     return Spread(math.sqrt(squares / freedom), freedom)
 
 
+@functools.cache
 def _largest_ratio(freedom: float, known: float) -> float:
     """Return the ratio of two variances that chance exceeds in one of a hundred cases."""
     from scipy import special  # as above

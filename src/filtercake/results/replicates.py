@@ -233,7 +233,7 @@ def _informed(good: pd.DataFrame) -> dict[str, float]:
 
     A resistance goes with the porosity: its spread is known in the ratio in which the packings show both.
     """
-    known = good[[KNOWN_SD, KNOWN_FREEDOM]].dropna()
+    known = good.reindex(columns=[KNOWN_SD, KNOWN_FREEDOM]).dropna()
     if known.empty:
         return {}
     own = pooled_spread([good["porosity"]]).sd

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -11,9 +12,11 @@ import pandas as pd
 
 from filtercake.packing.engines import ENGINES
 from filtercake.packing.pack import Report
-from filtercake.packing.replication import UntilNarrow
-from filtercake.packing.scene import Scene
-from filtercake.statistics import half_width, quantile
+from filtercake.packing.replication import LEAST_REPLICATES, UntilNarrow
+from filtercake.packing.scene import GRAVITY_PROTOCOL, Scene
+from filtercake.packing.spread import FREEDOM
+from filtercake.statistics import Spread, half_width, quantile
+from filtercake.units import FloatArray
 from filtercake.validation.error_against_time import Reference
 from filtercake.validation.timing import Contender, settle_timed
 
@@ -23,6 +26,10 @@ MOST: Final = 64
 COLUMNS: Final = ("case", "rule", "repeat", "n", "porosity", "half_width", "reached", "covered", "seconds")
 KNOWN, ALONE = "known spread", "its packings alone"
 """The rule of :class:`filtercake.packing.replication.UntilNarrow`, and that of :class:`Alone`."""
+
+
+RATIOS: Final = (0.5, 0.8, 1.0, 1.25, 1.5, 2.0)
+TRIED_INTERVAL: Final = 0.9
 
 
 class Alone:
@@ -104,6 +111,44 @@ def _row(asked: Asked, found: UntilNarrow | Alone, **place: Any) -> dict[str, An
         "reached": half <= asked.interval,
         "covered": abs(mean - asked.reference.porosity) <= unsure,
     }
+
+
+def unlike(repeats: int = 1000) -> pd.DataFrame:
+    """Try both rules on normal values whose spread is another than what is known of it, without a packing.
+
+    Returns
+    -------
+    DataFrame
+        Columns ratio (spread over that known), then share covered and mean number of values, of the rule and of
+        :class:`Alone`, asked for ``TRIED_INTERVAL`` times the known spread.
+    """
+    random = np.random.default_rng(SEED)
+    rows = []
+    for ratio in RATIOS:
+        sequences = ratio * random.standard_normal((repeats, MOST))
+        known, alone = (_tried(make, sequences) for make in (_Synthetic, Alone))
+        rows.append((ratio, *known, *alone))
+    return pd.DataFrame(rows, columns=["ratio", "covered", "n", "covered_alone", "n_alone"])
+
+
+class _Synthetic(UntilNarrow):
+    """The rule for values whose spread is known to be about 1."""
+
+    def __init__(self, interval: float):
+        self.interval, self.least = interval, LEAST_REPLICATES
+        self.known = Spread(1.0, FREEDOM[GRAVITY_PROTOCOL])
+        self.values = []
+
+
+def _tried(make: Callable[[float], UntilNarrow | Alone], sequences: FloatArray) -> tuple[float, float]:
+    """Return the share of sequences (m, n), of mean 0, whose interval holds it, and how many values it takes."""
+    covered, count = 0, 0
+    for sequence in sequences:
+        rule = make(TRIED_INTERVAL)
+        any(rule.add(float(value)) for value in sequence)
+        covered += bool(abs(np.mean(rule.values)) <= rule.half_width)
+        count += len(rule.values)
+    return covered / len(sequences), count / len(sequences)
 
 
 def summary(table: pd.DataFrame) -> pd.DataFrame:
