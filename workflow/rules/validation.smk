@@ -491,7 +491,7 @@ rule coverage:
     params:
         library=library("validation.interval_coverage"),
         case=lambda wildcards: ERROR_CASES[wildcards.case],
-        interval=0.002,
+        intervals=[0.002, 0.003],
         repeats=4 if QUICK else 40,
     message:
         "an interval asked for, again and again: {wildcards.case}"

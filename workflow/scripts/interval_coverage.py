@@ -21,7 +21,7 @@ with job(snakemake.log[0], snakemake.output) as log:
         snakemake.wildcards.case,
         replace(scene, particles=case["particles"]),
         reference_of(read_table(snakemake.input.reference), case["reference"], case["friction"]),
-        snakemake.params.interval,
+        tuple(snakemake.params.intervals),
     )
     table = coverage(asked, snakemake.params.repeats, lambda line: (log.info(line), Progress().note(line)))
     with publish(Path(snakemake.output[0])) as temporary:

@@ -23,7 +23,7 @@ from filtercake.validation.timing import Contender, settle_timed
 SEED: Final = 3001
 """Seeds from which an interval is asked for: neither the default's nor the reference's, nor those of fitted spreads."""
 MOST: Final = 64
-COLUMNS: Final = ("case", "rule", "repeat", "n", "porosity", "half_width", "reached", "covered", "seconds")
+COLUMNS: Final = ("case", "asked", "rule", "repeat", "n", "porosity", "half_width", "reached", "covered", "seconds")
 KNOWN, ALONE = "known spread", "its packings alone"
 """The rule of :class:`filtercake.packing.replication.UntilNarrow`, and that of :class:`Alone`."""
 
@@ -56,59 +56,61 @@ class Alone:
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked for: a case's scene, its true porosity, and the half-width of its interval."""
+    """What is asked for: a case's scene, its true porosity, and half-widths of its interval."""
 
     case: str
     scene: Scene
     reference: Reference
-    interval: float
+    intervals: tuple[float, ...]
 
 
 def coverage(asked: Asked, repeats: int, report: Report = lambda _: None) -> pd.DataFrame:
-    """Ask for an interval again and again, from other seeds, and see how often it holds the reference.
+    """Ask for intervals again and again, from other seeds, and see how often they hold the reference.
 
-    Both rules are shown the same packings, each until it has enough.
+    Both rules are shown the same packings for every half-width, each until it has enough.
 
     Returns
     -------
     DataFrame
-        Columns ``COLUMNS``: rule, number of packings, mean and half-width, whether the half-width asked for was
-        reached, whether the reference lies within half-width and its own uncertainty of the mean, seconds of packing.
+        Columns ``COLUMNS``: half-width asked for, rule, number of packings, mean and half-width, whether the half-width
+        asked for was reached, whether the reference lies within half-width and its own uncertainty of the mean, seconds
+        of packing.
     """
     rows = []
     for repeat in range(repeats):
         scene = replace(asked.scene, seed=SEED + repeat)
         made = Contender(scene.engine, scene, ENGINES[scene.engine]())
-        waiting: dict[str, UntilNarrow | Alone] = {
-            KNOWN: UntilNarrow(scene, asked.interval),
-            ALONE: Alone(asked.interval),
-        }
+        waiting: dict[tuple[float, str], UntilNarrow | Alone] = {}
+        for interval in asked.intervals:
+            waiting[interval, KNOWN] = UntilNarrow(scene, interval)
+            waiting[interval, ALONE] = Alone(interval)
         seconds = 0.0
         for replicate in range(MOST):
             found = settle_timed(made, replicate)
             seconds += found["wall_s"]
             if found["status"] != "ok":
                 continue
-            for name, rule in list(waiting.items()):
+            for (interval, name), rule in list(waiting.items()):
                 if rule.add(found["porosity"]) or replicate == MOST - 1:
-                    rows.append(_row(asked, rule, case=asked.case, rule=name, repeat=repeat, seconds=seconds))
-                    del waiting[name]
+                    rows.append({**_row(asked, rule), "rule": name, "repeat": repeat, "seconds": seconds})
+                    del waiting[interval, name]
             if not waiting:
                 break
-        counts = ", ".join(f"{row['n']} packings ({row['rule']})" for row in rows[-2:])
-        report(f"{asked.case}, repeat {repeat}: {counts}")
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+        counts = [f"{row['n']} for {row['asked']:g} ({row['rule']})" for row in rows if row["repeat"] == repeat]
+        report(f"{asked.case}, repeat {repeat}: {', '.join(counts)}")
+    return pd.DataFrame(rows, columns=list(COLUMNS)).sort_values(["asked", "rule", "repeat"], ignore_index=True)
 
 
-def _row(asked: Asked, found: UntilNarrow | Alone, **place: Any) -> dict[str, Any]:
+def _row(asked: Asked, found: UntilNarrow | Alone) -> dict[str, Any]:
     mean, half = float(np.mean(found.values)), found.half_width
     unsure = math.hypot(half, quantile(asked.reference.freedom) * asked.reference.standard_error)
     return {
-        **place,
+        "case": asked.case,
+        "asked": found.interval,
         "n": len(found.values),
         "porosity": mean,
         "half_width": half,
-        "reached": half <= asked.interval,
+        "reached": half <= found.interval,
         "covered": abs(mean - asked.reference.porosity) <= unsure,
     }
 
@@ -152,20 +154,21 @@ def _tried(make: Callable[[float], UntilNarrow | Alone], sequences: FloatArray) 
 
 
 def summary(table: pd.DataFrame) -> pd.DataFrame:
-    """Summarise coverage by case and rule.
+    """Summarise coverage by case, half-width asked for and rule.
 
     Returns
     -------
     DataFrame
-        Columns case, rule, repeats, met (reached and covered), least, most and mean number of packings, porosity (mean
-        over the repeats) and its 95 % half-width, seconds (mean).
+        Columns case, asked, rule, repeats, met (reached and covered), least, most and mean number of packings, porosity
+        (mean over the repeats) and its 95 % half-width, seconds (mean).
     """
     rows = []
-    for (case, rule), group in table.groupby(["case", "rule"], sort=False):
+    for (case, asked, rule), group in table.groupby(["case", "asked", "rule"], sort=False):
         count = group["n"]
         rows.append(
             {
                 "case": case,
+                "asked": asked,
                 "rule": rule,
                 "repeats": len(group),
                 "met": int((group["covered"] & group["reached"]).sum()),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ REPEATS = 60
 
 
 def asked(true: float = 0.35, standard_error: float = 0.0) -> Asked:
-    return Asked("pmma", SCENE, Reference(true, standard_error), SPREAD)
+    return Asked("pmma", SCENE, Reference(true, standard_error), (SPREAD,))
 
 
 @pytest.fixture
@@ -59,6 +60,14 @@ def test_what_is_not_accepted_does_not_count(packed: None) -> None:
     assert (long["seconds"] > 2.0 * long["n"]).all()
 
 
+def test_a_wider_interval_takes_fewer_of_the_same_packings(packed: None) -> None:
+    both = coverage(replace(asked(), intervals=(SPREAD, 1.5 * SPREAD)), 20)
+    alone = coverage(asked(), 20)
+    pd.testing.assert_frame_equal(both[both["asked"] == SPREAD].reset_index(drop=True), alone)
+    wide = summary(both[both["asked"] > SPREAD]).set_index("rule")["mean"]
+    assert wide[KNOWN] <= 0.5 * wide[ALONE]
+
+
 def test_without_an_end_the_last_packing_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
     def far_apart(_: Contender, replicate: int) -> dict[str, Any]:
         return {"status": "ok", "porosity": float(replicate % 2), "wall_s": 1.0}
@@ -81,6 +90,7 @@ def test_the_summary_counts() -> None:
     rows = pd.DataFrame(
         {
             "case": "pmma",
+            "asked": 0.002,
             "rule": KNOWN,
             "n": [5, 6, 7],
             "porosity": [0.35, 0.36, 0.37],
