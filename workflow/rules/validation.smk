@@ -395,7 +395,7 @@ ERROR_CASES = {
         "reference": "reference_alum_small",
     },
 }
-COVERAGE_CASES = ["pmma", "pmma_friction", "alum"]
+COVERAGE_CASES = ["pmma", "pmma_friction"]
 if QUICK:
     del ERROR_CASES["alum_wide"]
 BENCHMARK = f"{RESULTS}/benchmark{'_quick' if QUICK else ''}"
