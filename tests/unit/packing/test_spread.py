@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from documented import REPOSITORY
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,6 +25,7 @@ from filtercake.packing.spread import (
 from filtercake.validation import packing_spread
 from filtercake.validation.pressure import bed
 
+REPOSITORY = Path(__file__).resolve().parents[3]
 PMMA = bed({"mixture": {20.0: 0.5, 50.0: 0.5}}, particles=2000)
 
 
