@@ -36,7 +36,6 @@ from filtercake.study.loading import LoadedStudy, load_study
 from filtercake.study.points import Point, expand
 from filtercake.units import duration
 from filtercake.validation.growth import even_distribution
-from filtercake.validation.interval_coverage import KNOWN
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 DATA = REPOSITORY / "docs" / "data"
@@ -189,7 +188,7 @@ def test_an_interval_takes_as_many_packings_as_the_benchmark_found(
 ) -> None:
     point = point_of()
     table = pd.read_csv(DATA / "coverage.csv")
-    here = (table["case"] == "pmma") & (table["rule"] == KNOWN) & (table["asked"] == 0.002)
+    here = (table["case"] == "pmma") & (table["rule"] == "known spread") & (table["asked"] == 0.002)
     found = table.loc[here, "n"].mean()
     narrow = dataclasses.replace(point, replicates=1, porosity_ci95_target=0.002, max_replicates=64)
     assert packings_of(narrow) == pytest.approx(found, abs=1.0)
