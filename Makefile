@@ -121,7 +121,7 @@ report: setup ## figures, tables, captions, method in one file: results/report.h
 		--report-metadata workflow/report/landing.yaml
 	@echo "report: $(REPORT)"
 
-benchmark: setup ## run time against error: docs/benchmark.md (about 30 min on 2 cores; QUICK=1: a few minutes, docs untouched)
+benchmark: setup ## run time against error: docs/benchmark.md (about 45 min on 2 cores; QUICK=1: a few minutes, docs untouched)
 	$(SNAKEMAKE) benchmark $(if $(QUICK),--config quick=true)
 	$(if $(QUICK),,install -m 644 results/benchmark/benchmark.md docs/)
 	$(if $(QUICK),,install -m 644 results/benchmark/images/run_time_error.png docs/images/)

@@ -7,6 +7,7 @@ of their differences. What cannot be known, such as the spread of a single value
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,6 +20,9 @@ from filtercake.units import FloatArray
 
 CONFIDENCE: Final = 0.95
 """Probability with which an interval covers what it is of."""
+
+CONTRADICTION: Final = 0.99
+"""Probability of a ratio of variances below which values may have the spread that is known beforehand."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,44 @@ def half_width(values: ArrayLike) -> float:
     return quantile(x.size - 1.0) * standard_error(x)
 
 
+def informed_spread(values: ArrayLike, known: Spread) -> Spread:
+    """Pool the spread of independent values (n,) with what is known of it beforehand.
+
+    Each counts by its degrees of freedom. Where the values contradict it, scattering more than chance allows in one of
+    a hundred cases (F test), they alone count.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Independent values.
+    known : Spread
+        Standard deviation of one value as far as it is known without them.
+
+    Notes
+    -----
+    Source: the moderated t statistic of G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3. Over scenes whose
+    variances scatter about the known one as its degrees of freedom say, the interval of :func:`informed_half_width`
+    covers in 95 % of cases, and goes on to do so if packings are added until it is narrow: when that is depends on the
+    spread alone, which tells nothing of the mean of normal values.
+    """
+    own = pooled_spread([values])
+    if own.freedom == 0.0:
+        return known
+    if own.sd > known.sd * math.sqrt(_largest_ratio(own.freedom, known.freedom)):
+        return own
+    freedom = own.freedom + known.freedom
+    return Spread(math.sqrt((own.freedom * own.sd**2 + known.freedom * known.sd**2) / freedom), freedom)
+
+
+def informed_half_width(values: ArrayLike, known: Spread) -> float:
+    """Half-width of the 95 % interval of the mean of values (n,), whose spread is known beforehand as well.
+
+    Not a number without a value; see :func:`informed_spread`.
+    """
+    spread, count = informed_spread(values, known), _array(values).size
+    return quantile(spread.freedom) * spread.sd / math.sqrt(count) if count else math.nan
+
+
 def difference_half_width(one: ArrayLike, other: ArrayLike) -> float:
     """Half-width of Welch's 95 % interval of the difference of two means; nan where either has fewer than two values.
 
@@ -118,6 +160,14 @@ def pooled_spread(samples: Iterable[ArrayLike]) -> Spread:
         return Spread(math.nan, 0.0)
     squares = sum(float(np.sum((x - x.mean()) ** 2)) for x in listed if x.size)
     return Spread(math.sqrt(squares / freedom), freedom)
+
+
+@functools.cache
+def _largest_ratio(freedom: float, known: float) -> float:
+    """Return the ratio of two variances that chance exceeds in one of a hundred cases."""
+    from scipy import special  # as above
+
+    return float(special.fdtri(freedom, known, CONTRADICTION))
 
 
 def _array(values: ArrayLike) -> FloatArray:

@@ -442,6 +442,7 @@ ERROR_CASES = {
         "reference": "reference_alum_small",
     },
 }
+COVERAGE_CASES = ["pmma", "pmma_friction"]
 if QUICK:
     del ERROR_CASES["alum_wide"]
 BENCHMARK = f"{RESULTS}/benchmark{'_quick' if QUICK else ''}"
@@ -545,30 +546,37 @@ rule coverage:
     input:
         reference=str(ROOT / "docs" / "data" / "reference_replicates.csv"),
     output:
-        f"{BENCHMARK}/coverage.csv",
+        f"{BENCHMARK}/coverage/{{case}}.csv",
     log:
-        f"{BENCHMARK}/logs/coverage.log",
+        f"{BENCHMARK}/logs/coverage/{{case}}.log",
     benchmark:
-        f"{BENCHMARK}/benchmarks/coverage.tsv"
+        f"{BENCHMARK}/benchmarks/coverage/{{case}}.tsv"
+    wildcard_constraints:
+        case="|".join(COVERAGE_CASES),
     conda:
         "../envs/filtercake.yaml"
     resources:
         mem_mb=1000,
-        runtime=60,
+        runtime=90,
     params:
-        library=library("validation.error_against_time"),
-        case=ERROR_CASES["pmma"],
-        interval=0.002,
-        repeats=4 if QUICK else 20,
+        library=library("validation.interval_coverage"),
+        case=lambda wildcards: ERROR_CASES[wildcards.case],
+        intervals=[0.002, 0.003],
+        repeats=4 if QUICK else 40,
     message:
-        "an interval asked for, again and again"
+        "an interval asked for, again and again: {wildcards.case}"
     script:
         "../scripts/interval_coverage.py"
 
 
 rule benchmark_page:
     input:
-        coverage=tables_of_page(str(DATA / "coverage.csv"), f"{BENCHMARK}/coverage.csv"),
+        coverage=tables_of_page(
+            [str(DATA / "coverage.csv")],
+            expand(
+                "{folder}/coverage/{case}.csv", folder=BENCHMARK, case=COVERAGE_CASES
+            ),
+        ),
         errors=tables_of_page(
             [str(DATA / "run_time_error.csv")],
             expand("{folder}/errors/{case}.csv", folder=BENCHMARK, case=ERROR_CASES),
@@ -579,6 +587,7 @@ rule benchmark_page:
         template=str(ROOT / "workflow" / "report" / "benchmark.md.j2"),
     output:
         table="{folder}/run_time_error.csv",
+        coverage="{folder}/coverage.csv",
         png="{folder}/images/run_time_error.png",
         pdf="{folder}/images/run_time_error.pdf",
         page="{folder}/benchmark.md",

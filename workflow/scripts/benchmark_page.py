@@ -18,8 +18,10 @@ with job(snakemake.log[0], snakemake.output):
         on_front
     )
     references = pages.reference_table(read_table(snakemake.input.reference), snakemake.params.cases)
-    with publish(Path(snakemake.output.table)) as temporary:
-        table.to_csv(temporary, index=False)
+    coverage = pd.concat([read_table(file) for file in snakemake.input.coverage], ignore_index=True)
+    for output, rows in ((snakemake.output.table, table), (snakemake.output.coverage, coverage)):
+        with publish(Path(output)) as temporary:
+            rows.to_csv(temporary, index=False)
     with applied():
         figure = run_time_error.draw(table, references)
         save(figure, Path(snakemake.output.png), Path(snakemake.output.pdf))
@@ -28,7 +30,7 @@ with job(snakemake.log[0], snakemake.output):
         table,
         references,
         read_table(snakemake.input.choices),
-        read_table(snakemake.input.coverage),
+        coverage,
         read_table(snakemake.input.answers),
         Path(snakemake.params.data),
     )

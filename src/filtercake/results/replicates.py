@@ -17,9 +17,10 @@ from filtercake.packing.compression import CompressionCurve
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.porosity import measure
 from filtercake.packing.result import Packing, read_record
+from filtercake.packing.spread import known_spread
 from filtercake.permeability.replicates import RECORD, constant_of, read_solved
 from filtercake.results.resistance_columns import LAW, LAW_CI95, RESISTANCES, resistance_columns
-from filtercake.statistics import half_width
+from filtercake.statistics import Spread, half_width, informed_half_width, pooled_spread
 from filtercake.study.points import POINT_COLUMNS, Point
 from filtercake.units import MICROMETRE
 
@@ -39,6 +40,9 @@ MEASURED = (
 
 FLOW = ("permeability_m2", "kozeny_constant", "flow_numerical_ci95", "flow_slab_ci95")
 """Of solved packings: the two, and the relative half-widths of the numerics and of a packing's size."""
+
+KNOWN_SD, KNOWN_FREEDOM = "porosity_known_sd", "porosity_known_freedom"
+"""Where an interval is asked for: what is known of the porosity's spread beforehand, and as how much it counts."""
 
 REPLICATE_COLUMNS = (
     *POINT_COLUMNS,
@@ -62,6 +66,8 @@ REPLICATE_COLUMNS = (
     "bed_height_um",
     "steps",
     "wall_s",
+    KNOWN_SD,
+    KNOWN_FREEDOM,
 )
 SUMMARY_COLUMNS = (
     *POINT_COLUMNS,
@@ -140,6 +146,7 @@ def replicate_row(
         "bed_height_um": record["bed_height_m"] / MICROMETRE,
         "steps": record["steps"],
         "wall_s": record["wall_s"],
+        **_known(point),
     }
 
 
@@ -202,6 +209,7 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
             values = good[column].to_numpy(np.float64)
             row[column] = values.mean() if values.size else np.nan
             row[_interval_name(column)] = half_width(values)
+        row.update(_informed(good))
         row["interval_reached"] = _reached(row["porosity_ci95"], row["porosity_ci95_target"])
         row[LAW] = group.iloc[0][LAW]
         for column in (LAW_CI95, "load_over_strength", "soft_contact_compaction", "pull_off_over_weight"):
@@ -210,6 +218,30 @@ def summarise(replicates: pd.DataFrame) -> pd.DataFrame:
         row["overlap_max"] = good["overlap_max"].max()
         rows.append(row)
     return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
+
+
+def _known(point: Point) -> dict[str, float]:
+    """Say what is known of the porosity's spread where an interval is asked for; blank elsewhere."""
+    if point.porosity_ci95_target is None:
+        return {KNOWN_SD: np.nan, KNOWN_FREEDOM: np.nan}
+    known = known_spread(point.scene.as_packed())
+    return {KNOWN_SD: known.sd, KNOWN_FREEDOM: known.freedom}
+
+
+def _informed(good: pd.DataFrame) -> dict[str, float]:
+    """Half-widths of a point's intervals where one is asked for: of the rule that ended its packings.
+
+    A resistance goes with the porosity: its spread is known in the ratio in which the packings show both.
+    """
+    known = good.reindex(columns=[KNOWN_SD, KNOWN_FREEDOM]).dropna()
+    if known.empty:
+        return {}
+    own = pooled_spread([good["porosity"]]).sd
+    found = {_interval_name("porosity"): informed_half_width(good["porosity"], Spread(*known.iloc[0]))}
+    for column in RESISTANCES if own > 0.0 else ():
+        slope = pooled_spread([good[column]]).sd / own
+        found[_interval_name(column)] = slope * found["porosity_ci95"]
+    return found
 
 
 def _pressed(point: Point, record: Mapping[str, Any]) -> CakeAverage | None:

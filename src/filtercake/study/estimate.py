@@ -18,6 +18,7 @@ from filtercake.packing.engines import ENGINES
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.replication import LEAST_REPLICATES
 from filtercake.packing.scene import Scene
+from filtercake.packing.spread import known_spread
 from filtercake.permeability.resolution import LEVELS, bytes_needed, spacing
 from filtercake.statistics import quantile
 from filtercake.study.points import Point
@@ -50,8 +51,6 @@ GROWTH: Final = 0.1
 """Exponent of the time per sphere in the number of spheres: less of a large bed is surface, and it needs more steps."""
 START_SECONDS: Final = 5.0
 """Seconds of a job before and after its packings: Python, compiled kernels from their cache, records."""
-EXPECTED_FREEDOM: Final = 8
-"""Degrees of freedom of an interval asked for, as it is once reached: about nine packings."""
 
 USUAL_POROSITY: Final = 0.35
 """Of a bed, where what its flow takes is estimated."""
@@ -143,9 +142,13 @@ def packings_of(point: Point) -> int:
     """Return the packings that a point is expected to need: those asked for, or those that its interval takes."""
     if point.porosity_ci95_target is None:
         return point.replicates
-    half_width_of_one = quantile(EXPECTED_FREEDOM) * point.scene.expected_spread
-    needed = math.ceil((half_width_of_one / point.porosity_ci95_target) ** 2)
-    return min(max(needed, LEAST_REPLICATES, point.replicates), point.most_replicates)
+    known, needed = known_spread(point.scene.as_packed()), max(LEAST_REPLICATES, point.replicates)
+    while needed < point.most_replicates:
+        half_width = quantile(known.freedom + needed - 1.0) * known.sd / math.sqrt(needed)
+        if half_width <= point.porosity_ci95_target:
+            break
+        needed += 1
+    return min(needed, point.most_replicates)
 
 
 def job_seconds(point: Point, start: float = START_SECONDS) -> float:

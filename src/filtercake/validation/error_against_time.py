@@ -22,7 +22,6 @@ from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.engines.liggghts import Liggghts
 from filtercake.packing.engines.liggghts_as_published import LiggghtsAsPublished
 from filtercake.packing.pack import Report
-from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.scene import Scene
 from filtercake.statistics import (
     difference_half_width,
@@ -50,9 +49,6 @@ ALUM_SKIN = 10.0 * MICROMETRE
 TOLERANCE = 0.2
 """Relative uncertainty of a measured time, within which no variant counts as better than another."""
 PEER_CALLS = 20
-COVERAGE_SEED = 3001
-"""Seeds from which an interval is asked for: neither the default's nor the reference's."""
-COVERAGE_MOST = 64
 
 VARIANT_COLUMNS = ("case", "axis", "value", "engine", "particles")
 COLUMNS = (
@@ -375,49 +371,6 @@ def reference_of(table: pd.DataFrame, study: str, friction: float) -> Reference:
     if values.size < 2:
         raise ValueError(f"the reference holds no ensemble of {study} at friction {friction:g}")
     return Reference(float(values.mean()), standard_error(values), values.size - 1.0)
-
-
-def coverage(
-    scene: Scene,
-    reference: Reference,
-    interval: float,
-    repeats: int,
-    report: Report = lambda _: None,
-) -> pd.DataFrame:
-    """Ask for an interval again and again, from other seeds, and see how often it holds the reference.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    reference : Reference
-        Its true porosity.
-    interval : float
-        Half-width asked for.
-    repeats : int
-        How often.
-    report : callable
-        Takes a line per repeat.
-
-    Returns
-    -------
-    DataFrame
-        Columns repeat, n, porosity, half_width, reached, covered (the reference lies within ``interval`` of the mean).
-    """
-    rows = []
-    for repeat in range(repeats):
-        asked = replace(scene, seed=COVERAGE_SEED + repeat)
-        made = Contender(asked.engine, asked, ENGINES[asked.engine]())
-        rule = UntilNarrow(asked, interval)
-        for replicate in range(COVERAGE_MOST):
-            found = settle_timed(made, replicate)
-            if found["status"] == "ok" and rule.add(found["porosity"]):
-                break
-        mean = float(np.mean(rule.values))
-        reached, covered = rule.half_width <= interval, abs(mean - reference.porosity) <= interval
-        rows.append((repeat, len(rule.values), mean, rule.half_width, reached, covered))
-        report(f"repeat {repeat}: {len(rule.values)} packings, {mean:.4f} +- {rule.half_width:.4f}")
-    return pd.DataFrame(rows, columns=["repeat", "n", "porosity", "half_width", "reached", "covered"])
 
 
 def on_front(table: pd.DataFrame, tolerance: float = TOLERANCE) -> pd.Series[bool]:

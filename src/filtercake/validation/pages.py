@@ -16,8 +16,10 @@ from filtercake.permeability.measure import SPREAD
 from filtercake.study import limits
 from filtercake.user_files import templates
 from filtercake.validation import (
+    cheaper_intervals,
     emulator_design,
     emulator_evidence,
+    interval_coverage,
     pressure_column,
     pressure_evidence,
     resistance_law,
@@ -34,6 +36,8 @@ GOOD = (OK, UNDECIDED)
 """Outcomes of a case in which nothing went wrong as far as its packings can tell."""
 FAILING = ("inaccurate", "unsettled", "exploded", "refused")
 """Outcomes of a case beyond a limit."""
+SHALLOWEST_EXTRAPOLATED = 1.5
+"""Depth, over the paper's, down to which beds must reach for an extrapolation in 1/depth."""
 
 
 def reference_table(replicates: pd.DataFrame, cases: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
@@ -63,7 +67,7 @@ def benchmark(
 
     The tables are those of :func:`filtercake.validation.error_against_time.errors` (all cases, with ``on_front``),
     :func:`reference_table`, :func:`~filtercake.validation.error_against_time.choice_table`,
-    :func:`~filtercake.validation.error_against_time.coverage` and
+    :func:`~filtercake.validation.interval_coverage.coverage` and
     :func:`~filtercake.validation.answers.answers` (with the column friction); ``data`` is the folder of the committed
     results of long computations, whose tables the page shows too.
     """
@@ -75,17 +79,30 @@ def benchmark(
         references={row["case"]: row for row in _records(references)},
         choices=_records(choices),
         answers=_records(answers),
-        coverage={
-            "repeats": len(coverage),
-            "met": int((coverage["covered"] & coverage["reached"]).sum()),
-            "least": int(coverage["n"].min()),
-            "most": int(coverage["n"].max()),
-            "mean": float(coverage["n"].mean()),
-        },
+        coverage=_records(interval_coverage.summary(coverage)),
+        unlike=_records(interval_coverage.unlike()),
+        cheaper=_cheaper(pd.read_csv(data / "cheaper_intervals.csv")),
         headline={case: headline(errors[errors["case"] == case]) for case in errors["case"].unique()},
         said={case: said(errors[errors["case"] == case]) for case in errors["case"].unique()},
         data=tables,
     )
+
+
+def _cheaper(packings: pd.DataFrame) -> dict[str, Any]:
+    """Say what was tried to make intervals cheaper, and how beds go with their depth."""
+    means = cheaper_intervals.depths(packings)
+    deepest = means.iloc[-1]
+    limits = [
+        {"deepest": depth, **dict(zip(("porosity", "ci95"), cheaper_intervals.extrapolated(means, depth), strict=True))}
+        for depth in means["depth"]
+        if depth >= SHALLOWEST_EXTRAPOLATED
+    ]
+    return {
+        "methods": _records(cheaper_intervals.methods(packings)),
+        "depths": _records(means),
+        "deepest": deepest.to_dict(),
+        "limits": limits,
+    }
 
 
 def headline(errors: pd.DataFrame) -> dict[str, Any]:

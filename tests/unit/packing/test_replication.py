@@ -11,8 +11,10 @@ from filtercake.packing.pack import MANIFEST, pack_replicates
 from filtercake.packing.replication import LEAST_REPLICATES, UntilNarrow
 from filtercake.packing.result import read_record
 from filtercake.packing.scene import Scene
+from filtercake.packing.spread import known_spread
 from filtercake.results.replicates import REPLICATE_COLUMNS, summarise
 from filtercake.run import console
+from filtercake.statistics import Spread, half_width, informed_half_width
 from filtercake.study.loading import load_study
 from filtercake.study.points import expand
 
@@ -40,33 +42,46 @@ def until(interval: float, values: np.ndarray, least: int = 1) -> UntilNarrow:
     return rule
 
 
-@pytest.mark.parametrize("spread", [0.0005, 0.0015, 0.0026, 0.004])
-def test_the_interval_covers_the_truth(spread: float) -> None:
+SPREAD = known_spread(SCENE).sd
+
+
+@pytest.mark.parametrize("ratio", [0.5, 0.8, 1.0])
+@pytest.mark.parametrize("asked", [0.5, 0.9, 1.5])
+def test_the_interval_covers_the_truth(ratio: float, asked: float) -> None:
     random = np.random.default_rng(1)
     covered = 0
     for _ in range(400):
-        rule = until(0.002, random.normal(0.35, spread, 300))
-        assert rule.half_width <= 0.002
-        covered += abs(np.mean(rule.values) - 0.35) <= 0.002
-    assert covered >= 0.92 * 400  # 0.95 less two standard errors of 400 tries
+        rule = until(asked * SPREAD, random.normal(0.35, ratio * SPREAD, 300))
+        assert rule.half_width <= asked * SPREAD
+        covered += abs(np.mean(rule.values) - 0.35) <= rule.half_width
+    assert covered >= 0.92 * 400  # 0.95 less nearly three standard errors of 400 tries
+
+
+def test_it_takes_few_more_packings_than_a_spread_that_is_known_for_certain() -> None:
+    random = np.random.default_rng(2)
+    for asked in (0.5, 0.9, 1.0):
+        counts = [len(until(asked * SPREAD, random.normal(0.35, SPREAD, 300)).values) for _ in range(200)]
+        assert np.mean(counts) < (1.96 / asked) ** 2 + 1.6
 
 
 def test_more_spread_takes_more_packings() -> None:
     random = np.random.default_rng(2)
-    counts = [np.mean([len(until(0.002, random.normal(0.35, s, 300)).values) for _ in range(50)]) for s in (1e-3, 4e-3)]
-    assert counts[0] < 8
-    assert 12 < counts[1] < 30  # (1.96 * 4e-3 / 2e-3)^2 = 15
+    counts = [
+        np.mean([len(until(SPREAD, random.normal(0.35, s * SPREAD, 300)).values) for _ in range(50)]) for s in (0.5, 2)
+    ]
+    assert counts[0] < 5
+    assert 7 < counts[1] < 25
 
 
 def test_equal_packings_are_not_believed_at_once() -> None:
-    assert len(until(0.002, np.full(50, 0.35)).values) == LEAST_REPLICATES
-    assert len(until(0.002, np.full(50, 0.35), least=9).values) == 9
+    assert len(until(2.0 * SPREAD, np.full(50, 0.35)).values) == LEAST_REPLICATES
+    assert len(until(2.0 * SPREAD, np.full(50, 0.35), least=9).values) == 9
+    assert len(until(0.5 * SPREAD, np.full(50, 0.35)).values) > 6
 
 
-def test_one_lucky_interval_is_not_enough() -> None:
-    # narrow after the sixth, wide after the seventh
-    values = [0.35, 0.35, 0.35, 0.35, 0.352, 0.349, 0.356, *[0.35] * 30]
-    assert len(until(0.0011, np.array(values)).values) > 8
+def test_a_lucky_small_spread_is_not_believed() -> None:
+    values = 0.35 + SPREAD * np.array([0.0, 0.01, -0.01, 0.0, 0.01, *[0.0] * 30])
+    assert len(until(0.7 * SPREAD, values).values) >= 6
 
 
 def test_replicates_are_added_and_kept(tmp_path) -> None:
@@ -105,6 +120,45 @@ def test_the_summary_and_the_last_lines_say_what_was_not_reached(tmp_path) -> No
     said = console.success(tmp_path, {"study": {}})
     assert "wide: the porosity's interval is 0.12 after 3 packings, not 0.01 (packing.porosity_ci95_target)" in said
     assert "narrow" not in said.partition("summary.csv")[2]
+
+
+def summarised(known: float, asked: float, values: tuple[float, ...]) -> pd.Series:
+    rows = [
+        {
+            "point": "one",
+            "porosity_ci95_target": asked,
+            "status": "ok",
+            "porosity": value,
+            "resistance_m_kg": 1e9 * (1.0 - 10.0 * (value - 0.35)),
+            "porosity_paper_count": value + 0.01,
+            "porosity_known_sd": known,
+            "porosity_known_freedom": 30.0 if known else np.nan,
+        }
+        for value in values
+    ]
+    return summarise(pd.DataFrame(rows).reindex(columns=list(REPLICATE_COLUMNS))).iloc[0]
+
+
+def test_the_summary_has_the_interval_that_ended_the_search() -> None:
+    values = (0.351, 0.349, 0.350)
+    row = summarised(0.002, 0.01, values)
+    half = informed_half_width(values, Spread(0.002, 30.0))
+    assert row["porosity_ci95"] == pytest.approx(half)
+    assert row["resistance_ci95_m_kg"] == pytest.approx(1e10 * half)  # the porosity's times the slope
+    assert row["porosity_paper_count_ci95"] == pytest.approx(half_width(values))  # nothing is known of the count
+
+
+def test_without_an_interval_asked_for_student_has_the_word() -> None:
+    values = (0.351, 0.349, 0.350)
+    row = summarised(np.nan, np.nan, values)
+    assert row["porosity_ci95"] == pytest.approx(half_width(values))
+    assert row["resistance_ci95_m_kg"] == pytest.approx(1e10 * half_width(values))
+
+
+def test_equal_porosities_leave_a_resistance_its_own_interval() -> None:
+    row = summarised(0.002, 0.01, (0.35, 0.35, 0.35))
+    assert row["porosity_ci95"] > 0.0
+    assert row["resistance_ci95_m_kg"] == 0.0
 
 
 def test_a_study_asks_for_an_interval(tmp_path) -> None:

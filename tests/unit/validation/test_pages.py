@@ -12,6 +12,7 @@ from filtercake.figures.style import applied
 from filtercake.validation import pages
 from filtercake.validation.error_against_time import COLUMNS
 from filtercake.validation.figures import run_time_error, stability_maps
+from filtercake.validation.interval_coverage import KNOWN
 from filtercake.validation.stability import OUTCOMES, cases, with_fence
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -63,7 +64,8 @@ def choice_rows() -> pd.DataFrame:
 
 
 def coverage_rows() -> pd.DataFrame:
-    return pd.DataFrame({"n": [6, 9, 12], "covered": [True, True, False], "reached": [True, True, True]})
+    rows = {"n": [6, 9, 12], "covered": [True, True, False], "reached": [True, True, True], "seconds": [1.0, 2.0, 3.0]}
+    return pd.DataFrame({"case": "pmma", "asked": 0.002, "rule": KNOWN, "porosity": [0.351, 0.352, 0.353], **rows})
 
 
 def answer_rows() -> pd.DataFrame:
@@ -112,11 +114,12 @@ def test_the_benchmark_page_holds_the_tables_numbers() -> None:
     assert "| pmma | fastest with no larger an error: spheres 0.5 | 0.125 | 800 |" in page
     assert "| drop height | the paper's | 2 times | -0.0040 +- 0.0010 | +4.0 % |" in page
     assert "| pmma | 0.3512 | 0.0004 | 24 |" in page
-    assert "in 2 of 3" in page
     assert "| 0.3 | gravity | additive | 0.5 | 0.3520 | 3.1e+09 | -17.0 +- 1.2 % | 2.1 % | 3.44 | -8.0 % |" in page
     assert (
         "| 0.3 | filtration | instant estimate | 0.5 | 0.3520 | 3.1e+09 | -17.0 +- 1.0 % | – | 3.44 | -8.0 % |" in page
     )
+    assert "| pmma | 0.002 | known spread | 3 times | 2 | 6 to 12 | 9.0 | 0.3520 +- 0.0025 | 2 |" in page
+    assert "all that follows from the cloud" in page
     assert "Biased: spheres 0.5 (-0.0048)." in page
     assert "Failed: engine (liggghts) (3 of 8)." in page
     assert "| pmma | count | 0.3500 |" in page

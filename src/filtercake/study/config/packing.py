@@ -82,7 +82,7 @@ class Packing(Model):
     )
     porosity_ci95_target: Annotated[float, Field(ge=1e-4, le=0.1, allow_inf_nan=False), TO_NUMBER] | None = Field(
         default=None,
-        description="Add packings until the half-width of the porosity's 95 % interval is at most this (6 at least).",
+        description="Add packings until the half-width of the porosity's 95 % interval is at most this (3 at least).",
     )
     max_replicates: Annotated[int, Field(ge=2, le=1000), TO_WHOLE] = Field(
         default=64, description="Packings per point after which porosity_ci95_target gives up, and says so."
