@@ -1,13 +1,14 @@
-"""What is known of the porosity along the residence time: the instant estimate, and what packings have told of its error.
+"""What is known of the porosity along the residence time: the instant estimate, and what packings told of its error.
 
-The error of the estimate is a Gaussian process along the logarithm of the residence time: its standard deviation is that
-which the estimate states, and its correlation Matern's with smoothness 5/2,
+The error of the estimate is a Gaussian process along the logarithm of the residence time: its standard deviation is
+that which the estimate states, and its correlation Matern's with smoothness 5/2,
 
 ``rho = (1 + s + s^2/3) exp(-s)`` with ``s = sqrt(5) |ln(tau/tau')| / ln 2``.
 
 Distributions of one crystallizer are alike, so that an error at one residence time is there at its neighbours, too: two
-a factor of 1.26 apart share 0.92 of it, two a factor of 2 apart 0.52, a factor of 4 apart 0.14. The means of packings update the process (C. E.
-Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, eq. 2.23 and 2.24).
+a factor of 1.26 apart share 0.92 of it, two a factor of 2 apart 0.52, a factor of 4 apart 0.14. That is an assumption,
+on the side of caution. The means of packings update the process (C. E. Rasmussen and C. K. I. Williams, Gaussian
+Processes for Machine Learning, MIT Press 2006, eq. 2.23 and 2.24).
 
 At several pressure drops, each has a process of its own; the packings are the same, so that their errors are taken to
 be the same number of standard deviations at each.
@@ -133,7 +134,7 @@ class Belief:
         return replace(self, mean=mean, covariance=covariance)
 
     def _noise(self, groups: Sequence[Packed]) -> FloatArray:
-        """Variance of one packing at the level of each group, (groups, p): what is seen, pooled with what is expected."""
+        """Variance of one packing at each group's level, (groups, p): what is seen, pooled with what is expected."""
         expected = self.scatter[[item.level for item in groups]] ** 2
         freedom = sum(len(item.porosity) - 1 for item in groups)
         squares = sum(np.sum((item.porosity - item.porosity.mean(axis=0)) ** 2, axis=0) for item in groups)

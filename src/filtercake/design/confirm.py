@@ -1,9 +1,9 @@
 """Which packings a design needs, and when it needs no more.
 
 The first ones are where the estimate has its optimum: no answer stands on the estimate alone. Further ones are where
-they are expected to narrow the optimum's interval most: of the porosity curves drawn, each has a best residence time and
-a porosity at each level; how much of the spread of the former goes with the latter (linear regression, with the scatter
-of the packings) is what packings there would tell. Where all curves have one best residence time, it is the spread of
+they are expected to narrow the optimum's interval most: of the porosity curves drawn, each has a best residence time
+and a porosity at each level; how much of the spread of the former goes with the latter (linear regression, with the
+scatter of the packings) is what packings there would tell. Where all curves have one best residence time, it is the spread of
 the objective instead.
 """
 
@@ -132,9 +132,7 @@ def _nearest(belief: Belief, residence_time: float) -> int:
     return int(np.argmin(np.abs(belief.position[list(belief.levels)] - np.log(residence_time))))
 
 
-def _confirmed(
-    belief: Belief, optimum: Optimum, candidates: Sequence[Candidate], found: Found, near: int
-) -> bool:
+def _confirmed(belief: Belief, optimum: Optimum, candidates: Sequence[Candidate], found: Found, near: int) -> bool:
     """Whether accepted packings are where the optimum may be, or as near to it as can be."""
     packed = {item.level for item in candidates if len(found.porosity.get(item.name, ()))}
     at = {level: float(np.exp(belief.position[belief.levels[level]])) for level in packed}

@@ -22,7 +22,7 @@ from filtercake.study.config.study import Study
 from filtercake.study.config.sweep import SWEPT, Sweep
 from filtercake.study.loading import LoadedStudy, check_study
 from filtercake.study.points import ChooseEngine, Point, expand
-from filtercake.study.products import SETTLED_SOLIDS, resolve
+from filtercake.study.products import SETTLED_SOLIDS, product_name, resolve
 from filtercake.study.scenes import scene_of
 from filtercake.user_files import read_yaml
 
@@ -72,6 +72,25 @@ class LoadedDesign:
     levels: tuple[float, ...]
     warnings: tuple[str, ...]
 
+    @property
+    def products(self) -> list[str]:
+        """Names of the distributions that may be packed."""
+        return [product_name(time) for time in self.levels]
+
+    def params(self, choose_engine: ChooseEngine) -> dict[str, Any]:
+        """Return plain values that :meth:`filtercake.design.task.Task.from_params` takes, fit for a rule's params."""
+        asks = self.asks(choose_engine)
+        kinetics = dict(vars(self.kinetics))
+        if kinetics["residence_time_range"] is not None:
+            kinetics["residence_time_range"] = list(kinetics["residence_time_range"])
+        return {
+            "study": self.study.model.model_dump(mode="json"),
+            "kinetics": kinetics,
+            "correlations": {name: item.model_dump(mode="json") for name, item in self.correlations.items()},
+            "levels": list(self.levels),
+            "asks": [{"point": ask.point.as_dict(), "level": ask.level, "batch": ask.batch} for ask in asks],
+        }
+
     def asks(self, choose_engine: ChooseEngine) -> list[Ask]:
         """List every set of packings that may come to be needed; a further one of a level has another base seed."""
         found = []
@@ -87,6 +106,27 @@ class LoadedDesign:
     def _sweeps(self) -> list[Sweep]:
         """One block: pressed packings serve every pressure drop."""
         return [sweep.model_copy(update={"pressure_kPa": None}) for sweep in self.study.model.sweeps]
+
+
+def load_designs(studies: Iterable[LoadedStudy]) -> dict[str, LoadedDesign]:
+    """Check the designs of those studies that have one, by the study's name.
+
+    Raises
+    ------
+    ConfigError
+        With every problem of every design.
+    """
+    designs: dict[str, LoadedDesign] = {}
+    problems: list[Problem] = []
+    for study in studies:
+        if study.model.design is not None:
+            try:
+                designs[study.name] = load_design(study)
+            except ConfigError as error:
+                problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    return designs
 
 
 def load_design(study: LoadedStudy) -> LoadedDesign:
@@ -141,7 +181,7 @@ def pressures_of(design: Design, study: Study) -> list[float]:
 
 
 def _problems(study: Study, design: Design, file: str) -> Iterator[Problem]:
-    """What can be told from the study's file alone."""
+    """Find what can be told from the study's file alone."""
     for name in ("crystallizer", "filter"):
         if getattr(study, name) is None:
             yield Problem(file, name, "(missing)", "must be given for a design")
@@ -192,13 +232,15 @@ def _kinetic_problems(design: Design, kinetics: Kinetics, study: Study, file: st
         yield Problem(file, key, f"{slurry[0]:g}, {slurry[1]:g}", allowed)
     most = SETTLED_SOLIDS * study.material.density
     if slurry[1] >= most:
-        yield Problem(file, f"{key}[1]", f"{slurry[1]:g}", f"must be below {most:.4g} kg/m3: more is no slurry but a cake")
+        yield Problem(
+            file, f"{key}[1]", f"{slurry[1]:g}", f"must be below {most:.4g} kg/m3: more is no slurry but a cake"
+        )
 
 
 def _estimate_problems(study: LoadedStudy, design: Design) -> Iterator[Problem]:
-    """Ends of the range at which there is no estimate."""
+    """Find ends of the range at which there is no estimate."""
     for end, time in enumerate(design.variables.residence_time_min):
-        csd = next(csd for name, csd in study.csds.items() if study.model.csds[name].residence_time_min == time)
+        csd = study.csds[product_name(time)]
         swept = {name: study.model.base(name) for name in SWEPT}
         for pressure in pressures_of(design, study.model):
             scene = scene_of(

@@ -144,16 +144,16 @@ class CakeOf:
 
     Attributes
     ----------
-    porosity : float or ndarray
+    porosity : ndarray
         Its porosity.
-    resistance : float or ndarray
+    resistance : ndarray
         Its specific resistance, m/kg.
     sauter_mean : float
         Of the crystals, m.
     """
 
-    porosity: Values
-    resistance: Values
+    porosity: FloatArray
+    resistance: FloatArray
     sauter_mean: float
 
 
@@ -225,17 +225,18 @@ def evaluate(plant: Plant, settings: Settings, cake: CakeOf) -> Evaluated:
     of_vessel = plant.production if vessel.si_unit == "kg/s" else volume
     limits = plant.limits
     bought = [_purchase(plant, kind, np.asarray(of)) for kind, of in ((vessel, of_vessel), (cloth, size))]
-    parts = np.broadcast_arrays(
-        volume,
-        size,
-        thick,
-        share,
-        moisture,
-        bought[0],
-        bought[0] * vessel.installed_factor,
-        bought[1],
-        bought[1] * cloth.installed_factor,
-    )
+    columns = {
+        "crystallizer_volume": volume,
+        "filter_area": size,
+        "cake_thickness": thick,
+        "medium_share": share,
+        "cake_moisture": moisture,
+        "crystallizer_purchase": bought[0],
+        "crystallizer_installed": bought[0] * vessel.installed_factor,
+        "filter_purchase": bought[1],
+        "filter_installed": bought[1] * cloth.installed_factor,
+    }
+    shape = np.broadcast_shapes(*(values.shape for values in columns.values()))
     marks = [_in_range(vessel, np.asarray(of_vessel)), _in_range(cloth, size)]
     misses = {
         TOO_THIN: thick < limits.thinnest * (1.0 - ROUNDING),
@@ -244,9 +245,8 @@ def evaluate(plant: Plant, settings: Settings, cake: CakeOf) -> Evaluated:
         TOO_MUCH_MEDIUM: share > limits.largest_medium_share * (1.0 + ROUNDING),
         NOT_COSTED: _no_sense(vessel, np.asarray(of_vessel)) | _no_sense(cloth, size),
     }
-    shape = parts[0].shape
     return Evaluated(
-        *parts,
+        **{name: np.broadcast_to(values, shape) for name, values in columns.items()},
         in_range=np.broadcast_to(marks[0] & marks[1], shape),
         misses={name: np.broadcast_to(missed, shape) for name, missed in misses.items()},
     )
@@ -295,9 +295,7 @@ def _moisture(plant: Plant, settings: Settings, cake: CakeOf, thick: FloatArray)
     return deliquoring.moisture(wet, liquor, deliquoring.saturation(wet, liquor, time))
 
 
-def _batch(
-    plant: Plant, settings: Settings, cake: CakeOf
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _batch(plant: Plant, settings: Settings, cake: CakeOf) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Area, cake thickness and share of the medium of batch filters; their cakes' moisture is not known."""
     made = BatchCake(cake.resistance, cake.porosity, plant.density)
     batch = BatchFilter(

@@ -1,7 +1,7 @@
 """The best design at what is known of the porosity, and how sure it is.
 
-Of all that is varied, only the residence time needs packings. At each one, and at a few porosities that it may have, the
-other settings are found on a grid that closes in on the best of them; between the porosities, the objective is
+Of all that is varied, only the residence time needs packings. At each one, and at a few porosities that it may have,
+the other settings are found on a grid that closes in on the best of them; between the porosities, the objective is
 interpolated. The best residence time of each of many porosity curves that agree with what is known gives its interval.
 """
 
@@ -17,7 +17,7 @@ from filtercake.design.belief import Belief
 from filtercake.design.plant import CakeOf, Evaluated, Plant, Settings, evaluate
 from filtercake.statistics import CONFIDENCE
 from filtercake.study.config.design import DRUM
-from filtercake.units import FloatArray
+from filtercake.units import FloatArray, IntArray
 
 DRAWS: Final = 1000
 """Porosity curves drawn."""
@@ -182,16 +182,25 @@ def find(problem: Problem, belief: Belief) -> Optimum:
     if not (np.isfinite(middle).any() and kept.any()):
         nothing = (float("nan"), float("nan"))
         return Optimum(
-            OPEN, place, *(float("nan"),) * 3, *(np.inf,) * 3, nothing, (0.0, 0.0), choice, draws, values, curves, surface
+            OPEN,
+            place,
+            *(float("nan"),) * 3,
+            *(np.inf,) * 3,
+            nothing,
+            (0.0, 0.0),
+            choice,
+            draws,
+            values,
+            curves,
+            surface,
         )
     tail = 0.5 * (1.0 - CONFIDENCE)
-    best = _lowest(at, middle)
-    low, high = _ends(draws, best, tail)
+    low, high = _ends(draws, float(at[place]), tail)
     value_low, value_high = _ends(values, float(middle.min()), tail)
     optimum = Optimum(
         kind=OPEN,
         place=place,
-        residence_time=float(np.exp(best)),
+        residence_time=float(problem.residence_times[place]),
         low=float(np.exp(low)),
         high=float(np.exp(high)),
         value=float(middle.min()),
@@ -258,8 +267,8 @@ def _lowest(at: FloatArray, values: FloatArray) -> float:
 
 
 def _ends(draws: FloatArray, value: float, tail: float) -> Span:
-    """Ends of the 95 % interval, which holds the value."""
-    low, high = np.quantile(draws, [tail, 1.0 - tail])
+    """Return the ends of the 95 % interval, which holds the value."""
+    low, high = np.quantile(draws, [tail, 1.0 - tail], method="nearest")  # some may be infinite
     return min(float(low), value), max(float(high), value)
 
 
@@ -324,14 +333,14 @@ def _best_on(problem: Problem, place: int, kind: str, cake: CakeOf, axes: Mappin
     index = np.unravel_index(int(np.argmin(values)), shape)
     chosen = {name: float(axes[name][k]) for name, k in zip(AXES, index[1:], strict=True)}
     pressure = int(index[0])
-    own = replace(settings, pressure_drop=float(problem.pressure_drops[pressure]), **chosen)
+    own = Settings(kind, settings.residence_time, pressure_drop=float(problem.pressure_drops[pressure]), **chosen)
     return Choice(float(values[index]), own, pressure)
 
 
 def _laid_out(
     problem: Problem, place: int, kind: str, cake: CakeOf, axes: Mapping[str, FloatArray]
 ) -> tuple[Settings, CakeOf]:
-    """Settings and cakes of a grid, each along its own axis."""
+    """Lay out settings and cakes of a grid, each along its own axis."""
     count = len(AXES) + 1
 
     def along(values: FloatArray, axis: int) -> FloatArray:
@@ -348,7 +357,7 @@ def _laid_out(
     return settings, replace(cake, porosity=porosity, resistance=resistance)
 
 
-def pareto(first: FloatArray, second: FloatArray) -> FloatArray:
+def pareto(first: FloatArray, second: FloatArray) -> IntArray:
     """Numbers of the designs that no other one beats in both objectives, by the first; infinite ones are none."""
     order = np.lexsort((second, first))
     order = order[np.isfinite(first[order]) & np.isfinite(second[order])]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,18 +18,21 @@ from filtercake.design.confirm import Candidate, Found
 from filtercake.design.costs import Correlation
 from filtercake.design.emulator import cake_of
 from filtercake.design.emulator_file import shipped
-from filtercake.design.loading import EQUIPMENT, Ask, LoadedDesign, pressures_of
+from filtercake.design.loading import EQUIPMENT, Ask, pressures_of
 from filtercake.design.plant import Limits, Plant, Suction
 from filtercake.design.search import Problem
 from filtercake.filtration.resistance import resistance
+from filtercake.packing.compression import CompressionCurve
 from filtercake.packing.pack import MANIFEST, Outcome
 from filtercake.packing.result import read_record
+from filtercake.packing.scene import Scene
 from filtercake.results.replicates import REPLICATE_COLUMNS, replicate_rows
 from filtercake.statistics import quantile
 from filtercake.study.config.design import Design
 from filtercake.study.config.study import Study
 from filtercake.study.config.sweep import SWEPT
-from filtercake.study.points import ChooseEngine, Point
+from filtercake.study.points import Point
+from filtercake.study.products import product_name
 from filtercake.study.scenes import scene_of
 from filtercake.units import HOUR, KILOPASCAL, MICROMETRE, MILLIPASCAL_SECOND, MINUTE, FloatArray
 
@@ -67,12 +70,6 @@ class Task:
     asks: tuple[Ask, ...]
 
     @classmethod
-    def of(cls, design: LoadedDesign, choose_engine: ChooseEngine) -> Task:
-        """Build from a checked design."""
-        asks = tuple(design.asks(choose_engine))
-        return cls(design.study.model, design.kinetics, design.correlations, design.levels, asks)
-
-    @classmethod
     def from_params(cls, values: Mapping[str, Any]) -> Task:
         """Build from plain values, e.g. a rule's params."""
         kinetics = dict(values["kinetics"])
@@ -85,19 +82,6 @@ class Task:
             tuple(values["levels"]),
             tuple(Ask(Point.from_dict(ask["point"]), ask["level"], ask["batch"]) for ask in values["asks"]),
         )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, fit for a rule's params."""
-        kinetics = dict(vars(self.kinetics))
-        if kinetics["residence_time_range"] is not None:
-            kinetics["residence_time_range"] = list(kinetics["residence_time_range"])
-        return {
-            "study": self.study.model_dump(mode="json"),
-            "kinetics": kinetics,
-            "correlations": {name: item.model_dump(mode="json") for name, item in self.correlations.items()},
-            "levels": list(self.levels),
-            "asks": [{"point": ask.point.as_dict(), "level": ask.level, "batch": ask.batch} for ask in self.asks],
-        }
 
     @property
     def design(self) -> Design:
@@ -218,14 +202,15 @@ class Task:
         return [self._estimate(time) for time in self.levels]
 
     def _estimate(self, time: float) -> LevelEstimate:
-        name = next(name for name, csd in self.study.csds.items() if csd.residence_time_min == time)
-        packed = truncate(self._product(time * MINUTE), **self.study.csds[name].truncation).csd
+        truncation = self.study.csds[product_name(time)].truncation
+        packed = truncate(self._product(time * MINUTE), **truncation).csd
         base = {name: self.study.base(name) for name in SWEPT}
-        protocol, rows, outside = self.study.packing.protocol, [], ()
+        protocol, rows = self.study.packing.protocol, []
+        outside: tuple[str, ...] = ()
         for pressure in self.pressures / KILOPASCAL:
             scene = scene_of(self.study, packed, {**base, "pressure_kPa": float(pressure)}, protocol)
             found = shipped()[protocol].estimate(scene)
-            mean, one = found.half_widths(lambda curve, scene=scene: cake_of(scene, curve).porosity)
+            mean, one = found.half_widths(partial(_porosity, scene))
             unknown, whole = mean / quantile(), one / quantile()
             scatter = np.sqrt(max(whole**2 - unknown**2, 0.0))
             rows.append((cake_of(scene, found.curve).porosity, unknown, scatter))
@@ -234,7 +219,7 @@ class Task:
                 rows = rows * self.pressures.size
                 break
         porosity, deviation, scatters = np.array(rows).T
-        return LevelEstimate(porosity, deviation, scatters, tuple(outside))
+        return LevelEstimate(porosity, deviation, scatters, outside)
 
     @cached_property
     def prior(self) -> Belief:
@@ -271,3 +256,8 @@ class Task:
                 values = np.repeat(values[:, :1], self.pressures.size, axis=1)
             porosity[str(name)] = values
         return Found(porosity, len(table.drop_duplicates(["packings", "replicate"])))
+
+
+def _porosity(scene: Scene, curve: CompressionCurve) -> float:
+    """Porosity of a scene's cake, from that against the load."""
+    return cake_of(scene, curve).porosity

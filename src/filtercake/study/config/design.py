@@ -83,7 +83,8 @@ class Costs(Model):
     """By what the equipment is costed."""
 
     cost_index: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False), TO_NUMBER] = Field(
-        default=798.0, description="Chemical Engineering Plant Cost Index (CEPCI) of the costs: 397 in 2001, 798 in 2023."
+        default=798.0,
+        description="Chemical Engineering Plant Cost Index (CEPCI) of the costs: 397 in 2001, 798 in 2023.",
     )
     currency: Annotated[str, Field(min_length=1, max_length=10), TO_TEXT] = Field(
         default="USD", description="Name of the currency."
@@ -134,7 +135,8 @@ class Design(Model):
         description="Half-width of the 95 % interval of the optimum's residence time, over its value, that ends it.",
     )
     objective_tolerance: Annotated[float, Field(ge=1e-6, lt=1, allow_inf_nan=False), TO_NUMBER] = Field(
-        default=0.02, description="Relative difference of the objective that is no difference: it makes an optimum flat."
+        default=0.02,
+        description="Relative difference of the objective that is no difference: it makes an optimum flat.",
     )
 
     @model_validator(mode="after")
