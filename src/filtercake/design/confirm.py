@@ -3,8 +3,8 @@
 The first ones are where the estimate has its optimum: no answer stands on the estimate alone. Further ones are where
 they are expected to narrow the optimum's interval most: of the porosity curves drawn, each has a best residence time
 and a porosity at each level; how much of the spread of the former goes with the latter (linear regression, with the
-scatter of the packings) is what packings there would tell. Where all curves have one best residence time, it is the spread of
-the objective instead.
+scatter of the packings) is what packings there would tell. Where all curves have one best residence time, it is the
+spread of the objective instead.
 """
 
 from __future__ import annotations

@@ -21,6 +21,8 @@ from filtercake.units import KILOPASCAL, MINUTE, FloatArray
 
 TABLES: Final = ("search", "levels", "packings", "pareto", "safety", "costs")
 """Tables of a design; ``pareto`` is empty without a second objective."""
+EMPTY: Final = ["residence_time_min"]
+"""Columns of a table that has nothing to say."""
 MOST_TRADES: Final = 200
 """Rows of the table of two objectives."""
 MILLIMETRE: Final = 1e-3
@@ -78,15 +80,16 @@ def search_table(outcome: Outcome) -> pd.DataFrame:
     They are those of what is known of the porosity, at the settings of its mean; those of the objective allow for
     settings that follow the porosity.
     """
-    rows = []
+    rows, before = [], outcome.task.prior.mean
     for place, choice in enumerate(outcome.choices):
+        pressure = choice.pressure
         mid, low, high = (
             evaluated(outcome.problem, outcome.belief, place, choice, z) for z in (0.0, quantile(), -quantile())
         )
         values = outcome.optimum.surface[:, place]
         ends = np.quantile(values, [TAIL, 1.0 - TAIL], method="nearest") if values.size else (np.nan, np.nan)
         limits = [name for name, missed in mid.misses.items() if missed.any()]
-        porosity = [float(outcome.belief.mean[place, choice.pressure] + z * s) for z, s in _reaches(outcome, place)]
+        porosity = [float(outcome.belief.mean[place, pressure] + z * s) for z, s in _reaches(outcome, place)]
         alpha = [float(outcome.problem.resistance(place, np.array(value))) for value in porosity]
         rows.append(
             {
@@ -99,6 +102,9 @@ def search_table(outcome: Outcome) -> pd.DataFrame:
                 "resistance_m_kg": alpha[0],
                 "resistance_low_m_kg": alpha[2],
                 "resistance_high_m_kg": alpha[1],
+                "estimated_resistance_m_kg": float(
+                    outcome.problem.resistance(place, np.array(before[place, pressure]))
+                ),
                 "objective": choice.value,
                 "objective_low": float(ends[0]),
                 "objective_high": float(ends[1]),
@@ -132,6 +138,7 @@ def levels_table(outcome: Outcome) -> pd.DataFrame:
         rows.append(
             {
                 "residence_time_min": time,
+                "engine": str(own["engine"].iloc[0]),
                 "n": len(good),
                 "n_failed": len(own) - len(good),
                 "porosity": mean,
@@ -146,7 +153,7 @@ def levels_table(outcome: Outcome) -> pd.DataFrame:
                 "filter_area_high_m2": area[2],
             }
         )
-    columns = ["residence_time_min", "n", "n_failed", "porosity", "porosity_ci95", "estimated_porosity"]
+    columns = ["residence_time_min", "engine", "n", "n_failed", "porosity", "porosity_ci95", "estimated_porosity"]
     columns += ["estimated_porosity_ci95", "resistance_m_kg", "resistance_low_m_kg", "resistance_high_m_kg"]
     columns += ["filter_area_m2", "filter_area_low_m2", "filter_area_high_m2"]
     return pd.DataFrame(rows, columns=columns)
@@ -176,7 +183,7 @@ def pareto_table(outcome: Outcome) -> pd.DataFrame:
     """Tabulate the designs that no other one beats in both objectives; empty without a second one."""
     second, first = outcome.task.design.trade_off, outcome.task.design.objective
     if second is None or not outcome.optimum.possible:
-        return pd.DataFrame()
+        return pd.DataFrame(columns=EMPTY)
     rows: list[dict[str, Any]] = []
     for place in range(len(outcome.task.residence_times)):
         for settings, _, found in every_design(outcome.problem, outcome.belief, place):
@@ -190,7 +197,7 @@ def pareto_table(outcome: Outcome) -> pd.DataFrame:
                 )
     table = pd.DataFrame(rows)
     if table.empty:
-        return table
+        return pd.DataFrame(columns=EMPTY)
     best = table.iloc[pareto(table["first"].to_numpy(np.float64), table["second"].to_numpy(np.float64))]
     if len(best) > MOST_TRADES:
         best = best.iloc[np.unique(np.linspace(0, len(best) - 1, MOST_TRADES).round().astype(int))]
@@ -200,7 +207,7 @@ def pareto_table(outcome: Outcome) -> pd.DataFrame:
 def safety_table(outcome: Outcome) -> pd.DataFrame:
     """Tabulate what the filter may be designed for: what was found, the interval's end, and the paper's factor."""
     if not outcome.optimum.possible:
-        return pd.DataFrame()
+        return pd.DataFrame(columns=EMPTY)
     safety = outcome.safety
     own = float(safety.found)
     alpha = np.array([own, own + outcome.half_width, float(safety.upper), PAPER_FACTOR * own])
@@ -239,7 +246,7 @@ def safety_table(outcome: Outcome) -> pd.DataFrame:
 def costs_table(outcome: Outcome) -> pd.DataFrame:
     """Tabulate the best design by each cost correlation of its filter, side by side."""
     if not outcome.optimum.possible:
-        return pd.DataFrame()
+        return pd.DataFrame(columns=EMPTY)
     kind = outcome.optimum.choice.settings.filter_type
     own = outcome.task.filter_costs(kind)[0]
     rows = []
