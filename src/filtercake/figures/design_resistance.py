@@ -10,8 +10,11 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from filtercake.figures import designed, style
 from filtercake.figures.designed import TIME, DesignData
 from filtercake.figures.selection import law_title
+from filtercake.units import FloatArray
 
 AREA = ("filter_area_m2", "filter_area_low_m2", "filter_area_high_m2")
+WIDE = 2.5
+"""Factor between the ends of an ordinate from which it is logarithmic."""
 RESISTANCE = ("resistance_m_kg", "resistance_low_m_kg", "resistance_high_m_kg")
 
 
@@ -31,9 +34,10 @@ def draw(data: DesignData) -> Figure:
         resistance.plot(
             rows[TIME], rows["estimated_resistance_m_kg"], ":", color=style.colour(1), label="instant estimate alone"
         )
-    style.resistance_axis(resistance, data.search[RESISTANCE[0]].to_numpy(np.float64), log=len(rows) > 0)
+    known = rows[RESISTANCE[0]].to_numpy(np.float64)
+    style.resistance_axis(resistance, known, log=_wide(known))
     area.set_ylabel("Filter area (m²)")
-    if len(rows):
+    if _wide(rows[AREA[0]].to_numpy(np.float64)):
         area.set_yscale("log")
         area.yaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
         area.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -43,6 +47,11 @@ def draw(data: DesignData) -> Figure:
     notes = ["error bars: 95 % intervals of the mean", "grey: interval of the optimum"] if len(rows) else []
     designed.footer(figure, data, *notes, f"resistances by {law_title(data.summary['resistance_law'])}")
     return figure
+
+
+def _wide(values: FloatArray) -> bool:
+    """Whether values are better shown by their ratio."""
+    return values.size > 0 and bool(values.max() > WIDE * values.min())
 
 
 def _packings(axes: Axes, data: DesignData, columns: tuple[str, str, str]) -> None:

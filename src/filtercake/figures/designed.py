@@ -68,6 +68,11 @@ class DesignData:
         return dict(self.summary["best"])
 
 
+def sentence(text: str) -> str:
+    """Write a finding as a sentence."""
+    return f"{text[:1].upper()}{text[1:]}."
+
+
 def objective_label(data: DesignData, name: str) -> str:
     """Label of an axis of an objective."""
     words = OBJECTIVES[name]
