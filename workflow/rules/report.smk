@@ -54,6 +54,8 @@ rule study_pages:
         "{results}/{study}/logs/report.log",
     benchmark:
         "{results}/{study}/benchmarks/report.tsv"
+    wildcard_constraints:
+        results=re.escape(RESULTS),  # or <study>/design would be a study of a results folder <study>
     conda:
         "../envs/filtercake.yaml"
     resources:

@@ -33,6 +33,8 @@ DECIDES = 0.5
 """Share of the filter's resistance from which the medium, and not the cake, decides."""
 NEAR = 1e-3
 """Relative distance at which a setting is at a limit."""
+NARROW = 0.02
+"""Width of an interval, over its value, that takes a fourth digit to be seen."""
 THOUSAND, MILLION = 1e3, 1e6
 
 
@@ -64,17 +66,29 @@ def findings(outcome: Outcome) -> list[Finding]:
 
 def amount(outcome: Outcome, objective: str, value: float) -> str:
     """Write an objective's value with its unit."""
+    scale, unit = _unit(outcome, objective, value)
+    return f"{value / scale:.3g} {unit}"
+
+
+def amounts(outcome: Outcome, objective: str, value: float, low: float, high: float) -> str:
+    """Write an objective's value with its unit and the ends of its 95 % interval, told apart by their digits."""
+    scale, unit = _unit(outcome, objective, value)
+    digits = 3 if high - low > NARROW * value else 4
+    best, first, last = (f"{part / scale:.{digits}g}" for part in (value, low, high))
+    return f"{best} {unit} (95 %: {first} to {last})"
+
+
+def _unit(outcome: Outcome, objective: str, value: float) -> tuple[float, str]:
+    """Return the unit to write an objective in, and its size."""
+    currency = outcome.task.design.costs.currency
     if objective in COSTS:
-        return money(outcome, value)
-    return f"{value:.3g} m2" if objective == "filter_area" else f"{100.0 * value:.3g} %"
+        return (MILLION, f"million {currency}") if value >= MILLION else (THOUSAND, f"thousand {currency}")
+    return (1.0, "m2") if objective == "filter_area" else (0.01, "%")
 
 
 def money(outcome: Outcome, value: float) -> str:
     """Write a sum in thousands or millions."""
-    currency = outcome.task.design.costs.currency
-    if value >= MILLION:
-        return f"{value / MILLION:.3g} million {currency}"
-    return f"{value / THOUSAND:.3g} thousand {currency}"
+    return amount(outcome, COSTS[0], value)
 
 
 def minutes(seconds: float) -> str:
@@ -84,7 +98,7 @@ def minutes(seconds: float) -> str:
 
 def _optimum(outcome: Outcome) -> str:
     optimum, name = outcome.optimum, outcome.problem.objective
-    value, low, high = (amount(outcome, name, x) for x in (optimum.value, optimum.value_low, optimum.value_high))
+    value = amounts(outcome, name, optimum.value, optimum.value_low, optimum.value_high)
     interval = f"(95 %: {minutes(optimum.low)} to {minutes(optimum.high)})"
     where = f"at {minutes(optimum.residence_time)} min {interval}"
     ends = {LOWER: "the lower", UPPER: "the upper"}
@@ -98,7 +112,7 @@ def _optimum(outcome: Outcome) -> str:
         UPPER: f"{_because(outcome)}",
     }
     standing = words.get(optimum.kind, "not known to the width asked for")
-    return f"the least {OBJECTIVES[name]}, {value} (95 %: {low} to {high}), is {where}, {sizes}; {standing}"
+    return f"the least {OBJECTIVES[name]}, {value}, is {where}, {sizes}; {standing}"
 
 
 def _filter(outcome: Outcome) -> str:
