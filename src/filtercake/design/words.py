@@ -151,13 +151,18 @@ def _flat(outcome: Outcome) -> Iterator[str]:
 
 
 def _medium(outcome: Outcome) -> str:
-    share = float(outcome.best.medium_share)
-    if share > DECIDES:
+    """Say whether medium or cake decide the filter's size, at the best design and over the range."""
+    times = outcome.task.residence_times
+    ends = [(minutes(times[place]), float(outcome.at(place).medium_share)) for place in (0, len(times) - 1)]
+    shares = [float(outcome.best.medium_share), *(share for _, share in ends)]
+    there = f"{100.0 * shares[0]:.0f} % of the filter's resistance there"
+    span = " and ".join(f"{100.0 * share:.0f} % at {time} min" for time, share in ends)
+    if sum(shares) / len(shares) > DECIDES:
         return (
-            f"the filter is decided by the medium (Rm), not the cake: it holds {100.0 * share:.0f} % of the resistance "
-            "there, so that coarser crystals help little"
+            f"the medium (Rm) holds {there} ({span}): the filter is decided by the medium, not the cake, so that coarser "
+            "crystals help little"
         )
-    return f"the cake holds {100.0 * (1.0 - share):.0f} % of the filter's resistance, the medium the rest"
+    return f"the medium (Rm) holds {there} ({span}), the cake the rest"
 
 
 def _settings(outcome: Outcome) -> Iterator[str]:

@@ -39,7 +39,7 @@ sweeps:
 design:
   variables:
     residence_time_min: [10, 60]
-    rotation_rate_rpm: [0.1, 2]
+    rotation_rate_rpm: [0.1, 10]
   objective: installed_cost
   trade_off: filter_area
   constraints: {cake_thickness_mm: [5, 50]}
