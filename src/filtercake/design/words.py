@@ -159,8 +159,8 @@ def _medium(outcome: Outcome) -> str:
     span = " and ".join(f"{100.0 * share:.0f} % at {time} min" for time, share in ends)
     if sum(shares) / len(shares) > DECIDES:
         return (
-            f"the medium (Rm) holds {there} ({span}): the filter is decided by the medium, not the cake, so that coarser "
-            "crystals help little"
+            f"the medium (Rm) holds {there} ({span}): the filter is decided by the medium, not the cake, so that "
+            "coarser crystals help little"
         )
     return f"the medium (Rm) holds {there} ({span}), the cake the rest"
 

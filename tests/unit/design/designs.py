@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from filtercake.design import tables as tabulate
 from filtercake.design.loading import load_design
 from filtercake.design.outcome import Outcome
 from filtercake.design.task import Task
+from filtercake.packing.result import write_json
 from filtercake.results.replicates import REPLICATE_COLUMNS
 from filtercake.study import engine_choice
 from filtercake.study.loading import load_study
@@ -82,3 +84,15 @@ def packed(task: Task, porosity: Mapping[int, Sequence[float]]) -> Outcome:
         task,
         {level: np.asarray(values) - float(task.estimates[level].porosity[0]) for level, values in porosity.items()},
     )
+
+
+def written(outcome: Outcome, folder: Path) -> tuple[Path, list[str]]:
+    """Write a design's record and tables as its rule does; their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_json(folder / "design.json", tabulate.summary(outcome))
+    tables = []
+    for name, table in tabulate.tables(outcome).items():
+        path = folder / f"{name}.csv"
+        table.to_csv(path, index=False)
+        tables.append(str(path))
+    return folder / "design.json", tables
