@@ -97,6 +97,12 @@ class Outcome:
         cake = CakeOf(self.cake.porosity, resistance, float(self.problem.sauter_means[place]))
         return evaluate(self.problem.plant, self.optimum.choice.settings, cake)
 
+    def by_resistance(self, factor: float) -> Optimum:
+        """Find the best design if all resistances were so many times as high."""
+        own = self.problem.resistance
+        scaled = replace(self.problem, resistance=lambda place, porosity: factor * own(place, porosity))
+        return find(scaled, self.belief)
+
     def by_other_costs(self) -> Iterable[tuple[str, Optimum]]:
         """Yield the best design by each other correlation of the best design's filter, with its name."""
         kind = self.optimum.choice.settings.filter_type

@@ -212,6 +212,7 @@ def safety_table(outcome: Outcome) -> pd.DataFrame:
     own = float(safety.found)
     alpha = np.array([own, own + outcome.half_width, float(safety.upper), PAPER_FACTOR * own])
     found = outcome.with_resistance(alpha)
+    shifted = [outcome.by_resistance(float(factor)) for factor in alpha / own]
     holds = [
         ("as found", "nothing: half of all cakes of this kind resist more", "all errors"),
         (
@@ -237,6 +238,8 @@ def safety_table(outcome: Outcome) -> pd.DataFrame:
             "resistance_over_found": alpha / own,
             "filter_area_m2": np.broadcast_to(found.filter_area, alpha.shape),
             "filter_installed_cost": np.broadcast_to(found.filter_installed, alpha.shape),
+            "best_residence_time_min": [optimum.residence_time / MINUTE for optimum in shifted],
+            "best_objective": [optimum.value for optimum in shifted],
             "holds": [row[1] for row in holds],
             "leaves_out": [row[2] for row in holds],
         }

@@ -11,6 +11,7 @@ from filtercake.design.outcome import Outcome
 from filtercake.design.plant import Evaluated, drum_of
 from filtercake.design.search import FLAT, INTERIOR, LOWER, ON_THE_DRUM, UPPER
 from filtercake.filtration.drum_filter import Cake, model_warnings
+from filtercake.filtration.safety import PAPER_FACTOR
 from filtercake.study.config.design import CAKE_MOISTURE, DRUM
 from filtercake.units import KILOPASCAL, MINUTE
 
@@ -232,7 +233,11 @@ def _safety(outcome: Outcome) -> str:
     safety = outcome.safety
     sized = outcome.with_resistance(np.array([float(safety.upper), float(safety.paper)]))
     upper, paper = (f"{area:.3g} m2" for area in np.asarray(sized.filter_area).ravel())
-    return f"{safety.words()}; the filter would be {upper} for the interval's end, {paper} for the paper's factor"
+    text = f"{safety.words()}; the filter would be {upper} for the interval's end, {paper} for the paper's factor"
+    shifted = outcome.by_resistance(PAPER_FACTOR)
+    if not shifted.possible:
+        return f"{text}, at which no design would keep to the limits"
+    return f"{text}, at which the best residence time would be {minutes(shifted.residence_time)} min"
 
 
 def _outside(outcome: Outcome) -> Iterator[str]:

@@ -71,6 +71,9 @@ def test_safety_names_what_each_choice_leaves_out(outcome: Outcome) -> None:
     assert table["resistance_over_found"].iloc[0] == 1.0 and table["resistance_over_found"].iloc[3] == 2.0
     assert table["resistance_over_found"].is_monotonic_increasing and table["filter_area_m2"].is_monotonic_increasing
     assert table["leaves_out"].str.len().min() > 5
+    # a cake that resists more wants a larger crystallizer
+    assert table["best_residence_time_min"].is_monotonic_increasing and table["best_objective"].is_monotonic_increasing
+    assert table["best_residence_time_min"].iloc[0] == outcome.optimum.residence_time / 60.0
     upper = math.hypot(outcome.half_width, outcome.law_half_width) / float(outcome.cake.resistance)
     assert table["resistance_over_found"].iloc[2] == pytest.approx(1.0 + upper)
     (said,) = texts(outcome, "safety")
