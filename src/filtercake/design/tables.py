@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, Final
 
 import numpy as np
@@ -122,11 +122,10 @@ def _reaches(outcome: Outcome, place: int) -> list[tuple[float, float]]:
 
 def levels_table(outcome: Outcome) -> pd.DataFrame:
     """Tabulate the residence times packed: estimate and packings beside it, at the best design's pressure drop."""
-    rows = []
+    rows, pressure = [], outcome.optimum.choice.pressure
     table = _at_pressure(outcome)
     for level, time in enumerate(outcome.task.levels):
         place = outcome.belief.levels[level]
-        pressure = outcome.choices[place].pressure
         own = table[table["level"] == level]
         if own.empty:
             continue
@@ -175,7 +174,9 @@ def _sized(outcome: Outcome, place: int, porosity: FloatArray) -> tuple[list[flo
     if known.any():
         cake = outcome.problem.cake(place, porosity[known])
         alpha[known] = cake.resistance
-        size[known] = evaluate(outcome.problem.plant, outcome.choices[place].settings, cake).filter_area
+        pressure = outcome.optimum.choice.settings.pressure_drop
+        settings = replace(outcome.choices[place].settings, pressure_drop=pressure)
+        size[known] = evaluate(outcome.problem.plant, settings, cake).filter_area
     return alpha.tolist(), size.tolist()
 
 

@@ -250,11 +250,10 @@ class Task:
         porosity: dict[str, FloatArray] = {}
         for name, rows in table.groupby("packings", sort=False):
             good = rows[rows["status"] == "ok"]
-            wide = good.groupby("replicate")["porosity"].apply(list)
-            values = np.array([*wide], dtype=np.float64).reshape(len(wide), -1)
-            if values.shape[1] != self.pressures.size:
-                values = np.repeat(values[:, :1], self.pressures.size, axis=1)
-            porosity[str(name)] = values
+            each = [one["porosity"].to_numpy(np.float64) for _, one in good.groupby("replicate")]
+            # a bed has one porosity, whatever the pressure drop
+            values = [np.broadcast_to(one, self.pressures.shape) for one in each]
+            porosity[str(name)] = np.array(values).reshape(len(each), self.pressures.size)
         return Found(porosity, len(table.drop_duplicates(["packings", "replicate"])))
 
 

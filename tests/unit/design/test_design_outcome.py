@@ -137,6 +137,27 @@ def test_a_design_that_cannot_be_has_tables_without_rows(tmp_path: Path) -> None
         pd.read_csv(path)
 
 
+def test_packings_that_all_failed_tell_nothing(tmp_path: Path) -> None:
+    outcome = made(task_of(tmp_path), {2: (math.nan, math.nan)})
+    (found,) = outcome.task.found(outcome.packings).porosity.values()
+    assert found.shape == (0, 1) and outcome.task.found(outcome.packings).made == 2
+    assert (outcome.belief.mean == outcome.task.prior.mean).all()
+    levels = tabulate.levels_table(outcome)
+    assert levels["n"].tolist() == [0] and levels["n_failed"].tolist() == [2] and levels["porosity"].isna().all()
+
+
+def test_beds_have_one_porosity_at_every_pressure(tmp_path: Path) -> None:
+    text = DESIGN.replace("protocol: filtration", "initial_void_fraction: 0.6").replace("  adhesion_mJ_m2: 0\n", "")
+    text = text.replace("    rotation_rate_rpm: [0.1, 10]\n", "    pressure_drop_kPa: [20, 80]\n")
+    task = task_of(tmp_path, text)
+    assert task.prior.mean.shape[1] == 9 and (np.ptp(task.prior.mean, axis=1) == 0.0).all()
+    outcome = made(task, {1: (0.001,)})
+    outcome = Outcome(task, outcome.packings.drop_duplicates("replicate"), "because")
+    (found,) = task.found(outcome.packings).porosity.values()
+    assert found.shape == (1, 9) and np.ptp(found) == 0.0
+    assert outcome.optimum.choice.settings.pressure_drop == pytest.approx(80e3)
+
+
 def test_pressed_packings_are_measured_at_every_pressure(tmp_path: Path) -> None:
     text = DESIGN.replace("    rotation_rate_rpm: [0.1, 10]\n", "    pressure_drop_kPa: [20, 80]\n")
     text = text.replace("adhesion_mJ_m2: 0", "adhesion_mJ_m2: 5")
