@@ -33,6 +33,8 @@ SMOOTHING_DEGREE: Final = 3
 estimate makes a step of some 0.0005 that is no property of the crystals."""
 PRIOR_FREEDOM: Final = 4.0
 """Packings that the estimate's scatter of one packing counts for, beside the scatter that is seen."""
+POSSIBLE: Final = (0.02, 0.9)
+"""Porosities of a cake, whatever an interval says."""
 SMALLEST_DEVIATION: Final = 1e-6
 """Standard deviation of a porosity below which nothing is told apart."""
 
@@ -147,6 +149,10 @@ class Belief:
         """Standard deviation of what is not known, shape (m, p)."""
         variance = np.diagonal(self.covariance, axis1=1, axis2=2).T
         return np.asarray(np.maximum(np.sqrt(np.maximum(variance, 0.0)), SMALLEST_DEVIATION))
+
+    def at(self, place: int, deviations: float = 0.0) -> FloatArray:
+        """Return the porosity at a place, so many standard deviations above its mean, per pressure drop, (p,)."""
+        return np.asarray(np.clip(self.mean[place] + deviations * self.deviation[place], *POSSIBLE))
 
     def draws(self, count: int, seed: int) -> FloatArray:
         """Draw porosity curves, in standard deviations about the mean, shape (count, m).

@@ -68,7 +68,7 @@ class Outcome:
     def cake(self) -> CakeOf:
         """Cake of the best design: numbers, no arrays."""
         place, pressure = self.optimum.place, self.optimum.choice.pressure
-        whole = self.problem.cake(place, self.belief.mean[place])
+        whole = self.problem.cake(place, self.belief.at(place))
         return replace(whole, porosity=whole.porosity[pressure], resistance=whole.resistance[pressure])
 
     @cached_property
@@ -81,8 +81,7 @@ class Outcome:
     def half_width(self) -> float:
         """Half-width of the 95 % interval of the best design's resistance, from what is known of the porosity, m/kg."""
         place, pressure = self.optimum.place, self.optimum.choice.pressure
-        reach = quantile() * self.belief.deviation[place, pressure]
-        low = self.problem.resistance(place, self.belief.mean[place, pressure] - reach)
+        low = self.problem.resistance(place, self.belief.at(place, -quantile())[pressure])
         return float(low - self.cake.resistance)
 
     @property

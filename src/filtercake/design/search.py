@@ -219,22 +219,21 @@ def find(problem: Problem, belief: Belief) -> Optimum:
 
 def best_at(problem: Problem, belief: Belief, place: int, deviations: float) -> Choice:
     """Find the best settings at a residence time, its porosity so many standard deviations above the mean."""
-    cake = problem.cake(place, belief.mean[place] + deviations * belief.deviation[place])
+    cake = problem.cake(place, belief.at(place, deviations))
     found = [_settings(problem, place, kind, cake) for kind in problem.filter_types]
     return min(found, key=lambda choice: choice.value)
 
 
 def evaluated(problem: Problem, belief: Belief, place: int, choice: Choice, deviations: float = 0.0) -> Evaluated:
     """Size and cost the settings chosen at a residence time, for another porosity."""
-    porosity = belief.mean[place] + deviations * belief.deviation[place]
-    cake = problem.cake(place, porosity)
+    cake = problem.cake(place, belief.at(place, deviations))
     one = replace(cake, porosity=cake.porosity[choice.pressure], resistance=cake.resistance[choice.pressure])
     return evaluate(problem.plant, choice.settings, one)
 
 
 def every_design(problem: Problem, belief: Belief, place: int) -> Iterator[tuple[Settings, CakeOf, Evaluated]]:
     """Yield all designs on the grid at a residence time, by filter type."""
-    cake = problem.cake(place, belief.mean[place])
+    cake = problem.cake(place, belief.at(place))
     for kind in problem.filter_types:
         settings, shaped = _laid_out(problem, place, kind, cake, _axes(problem, kind))
         yield settings, shaped, evaluate(problem.plant, settings, shaped)

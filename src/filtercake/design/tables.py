@@ -89,7 +89,7 @@ def search_table(outcome: Outcome) -> pd.DataFrame:
         values = outcome.optimum.surface[:, place]
         ends = np.quantile(values, [TAIL, 1.0 - TAIL], method="nearest") if values.size else (np.nan, np.nan)
         limits = [name for name, missed in mid.misses.items() if missed.any()]
-        porosity = [float(outcome.belief.mean[place, pressure] + z * s) for z, s in _reaches(outcome, place)]
+        porosity = [float(outcome.belief.at(place, z)[pressure]) for z in (0.0, -quantile(), quantile())]
         alpha = [float(outcome.problem.resistance(place, np.array(value))) for value in porosity]
         rows.append(
             {
@@ -112,12 +112,6 @@ def search_table(outcome: Outcome) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
-
-
-def _reaches(outcome: Outcome, place: int) -> list[tuple[float, float]]:
-    """Middle, lower and upper end of the interval, in standard deviations of the porosity, and these."""
-    deviation = float(outcome.belief.deviation[place, outcome.choices[place].pressure])
-    return [(0.0, deviation), (-quantile(), deviation), (quantile(), deviation)]
 
 
 def levels_table(outcome: Outcome) -> pd.DataFrame:

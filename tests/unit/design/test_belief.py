@@ -88,3 +88,9 @@ def test_drawn_curves_have_the_spread_and_the_correlation() -> None:
     measured = np.corrcoef(curves[:, 0], curves[:, 4])[0, 1]
     assert measured == pytest.approx(float(correlation(np.log(2.0))), abs=0.02)
     assert (belief.draws(10, 1) == curves[:10]).all()
+
+
+def test_no_interval_reaches_what_no_cake_can_be() -> None:
+    wide = prior(0.2)
+    assert wide.at(0, -3.0)[0] == 0.02 and wide.at(0, 3.0)[0] == 0.9
+    assert wide.at(4)[0] == pytest.approx(0.35)
