@@ -287,12 +287,24 @@ def drum_of(plant: Plant, settings: Settings) -> DrumFilter:
 def _moisture(plant: Plant, settings: Settings, cake: CakeOf, thick: FloatArray) -> FloatArray:
     if plant.suction is None:
         return np.full(thick.shape, np.nan)
+    wet, liquor, left = _drained(plant, plant.suction, settings, cake, thick)
+    return deliquoring.moisture(wet, liquor, left)
+
+
+def moisture_ends(plant: Plant, settings: Settings, cake: CakeOf, thick: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the moistures of a drum's cakes at both ends of the correlation's error; nan where none is asked for."""
+    if plant.suction is None:
+        return np.full(thick.shape, np.nan), np.full(thick.shape, np.nan)
+    return deliquoring.moisture_range(*_drained(plant, plant.suction, settings, cake, thick))
+
+
+def _drained(
+    plant: Plant, suction: Suction, settings: Settings, cake: CakeOf, thick: FloatArray
+) -> tuple[deliquoring.WetCake, deliquoring.Liquor, FloatArray]:
+    """Cake, liquor, and how full the pores are after the suction."""
     wet = deliquoring.WetCake(cake.resistance, cake.porosity, plant.density, cake.sauter_mean, thick)
-    liquor = deliquoring.Liquor(
-        settings.pressure_drop, plant.viscosity, plant.liquid_density, plant.suction.surface_tension
-    )
-    time = plant.suction.share / np.asarray(settings.rotation_rate)
-    return deliquoring.moisture(wet, liquor, deliquoring.saturation(wet, liquor, time))
+    liquor = deliquoring.Liquor(settings.pressure_drop, plant.viscosity, plant.liquid_density, suction.surface_tension)
+    return wet, liquor, deliquoring.saturation(wet, liquor, suction.share / np.asarray(settings.rotation_rate))
 
 
 def _batch(plant: Plant, settings: Settings, cake: CakeOf) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from filtercake.design.outcome import Outcome
-from filtercake.design.plant import Evaluated, drum_of
+from filtercake.design.plant import Evaluated, drum_of, moisture_ends
 from filtercake.design.search import FLAT, INTERIOR, LOWER, ON_THE_DRUM, UPPER
 from filtercake.filtration.drum_filter import Cake, model_warnings
 from filtercake.filtration.safety import PAPER_FACTOR
@@ -58,6 +58,7 @@ def findings(outcome: Outcome) -> list[Finding]:
         *(Finding("settings", text) for text in _settings(outcome)),
         *(Finding("costs", text) for text in _other_costs(outcome)),
         *(Finding("costs", text) for text in _out_of_range(outcome)),
+        *(Finding("moisture", text) for text in _moisture(outcome)),
         Finding("safety", _safety(outcome)),
         *(Finding("estimate", text) for text in _outside(outcome)),
         *(Finding("filter", text) for text in _filter_warnings(outcome)),
@@ -227,6 +228,15 @@ def _out_of_range(outcome: Outcome) -> Iterator[str]:
                 f"the {what} of {size:.3g} {unit} is outside of what its cost correlation is for, {limits[0]:.3g} to "
                 f"{limits[1]:.3g} {unit}: its cost is extrapolated"
             )
+
+
+def _moisture(outcome: Outcome) -> Iterator[str]:
+    """Say how well the moisture is known, where it is asked for."""
+    plant, best = outcome.problem.plant, outcome.best
+    if plant.suction is not None:
+        ends = moisture_ends(plant, outcome.optimum.choice.settings, outcome.cake, best.cake_thickness)
+        low, own, high = (f"{100.0 * float(value):.3g}" for value in (ends[0], best.cake_moisture, ends[1]))
+        yield f"the cake keeps {own} % of moisture, {low} to {high} % within the correlation's own error"
 
 
 def _safety(outcome: Outcome) -> str:

@@ -109,6 +109,14 @@ def test_the_words_say_where_and_why(outcome: Outcome) -> None:
     ("change", "kind", "says"),
     [
         (("5.0e+9", "2.0e+10"), "medium", "the filter is decided by the medium, not the cake"),
+        (
+            (
+                "trade_off: filter_area",
+                "trade_off: cake_moisture\n  deliquoring_share: 0.4\n  surface_tension_mN_m: 72",
+            ),
+            "moisture",
+            "within the correlation's own error",
+        ),
         (("5.0e+9", "0"), "medium", "holds 0 % of the filter's resistance there"),
         (("[0.1, 10]", "[0.1, 0.6]"), "settings", "rotation rate 0.6 rpm, the highest asked for"),
         (("objective: installed_cost", "objective: filter_area\n  costs: {currency: EUR}"), "optimum", "upper bound"),

@@ -21,6 +21,7 @@ from filtercake.design.plant import (
     Settings,
     Suction,
     evaluate,
+    moisture_ends,
 )
 from filtercake.filtration import deliquoring
 from filtercake.filtration.drum_filter import DrumFilter, area, cake_thickness, medium_share
@@ -118,4 +119,6 @@ def test_a_moisture_is_that_of_the_suction_after_the_slurry() -> None:
     liquor = deliquoring.Liquor(53.32e3, 1e-3, 1000.0, 0.072)
     expected = deliquoring.moisture(wet, liquor, deliquoring.saturation(wet, liquor, 0.4 * 300.0))
     assert float(found.cake_moisture) == pytest.approx(float(expected))
+    low, high = moisture_ends(plant, SETTINGS, CAKE, found.cake_thickness)
+    assert float(low) < float(found.cake_moisture) < float(high)
     assert np.isnan(evaluate(PLANT, SETTINGS, CAKE).cake_moisture).all()
