@@ -94,8 +94,9 @@ def search_table(outcome: Outcome) -> pd.DataFrame:
         rows.append(
             {
                 **_row(choice.settings, mid),
-                "filter_area_low_m2": float(low.filter_area),
-                "filter_area_high_m2": float(high.filter_area),
+                # of a cake as high as the filter, a denser one is more of it: the area may fall
+                "filter_area_low_m2": min(float(item.filter_area) for item in (low, mid, high)),
+                "filter_area_high_m2": max(float(item.filter_area) for item in (low, mid, high)),
                 "porosity": porosity[0],
                 "porosity_low": porosity[1],
                 "porosity_high": porosity[2],
@@ -142,8 +143,8 @@ def levels_table(outcome: Outcome) -> pd.DataFrame:
                 "resistance_low_m_kg": alpha[1],
                 "resistance_high_m_kg": alpha[2],
                 "filter_area_m2": area[0],
-                "filter_area_low_m2": area[1],
-                "filter_area_high_m2": area[2],
+                "filter_area_low_m2": float(np.min(area)),
+                "filter_area_high_m2": float(np.max(area)),
             }
         )
     columns = ["residence_time_min", "engine", "n", "n_failed", "porosity", "porosity_ci95", "estimated_porosity"]

@@ -166,6 +166,17 @@ def test_beds_have_one_porosity_at_every_pressure(tmp_path: Path) -> None:
     assert outcome.optimum.choice.settings.pressure_drop == pytest.approx(80e3)
 
 
+def test_the_ends_of_an_area_hold_it_where_a_denser_cake_needs_less(tmp_path: Path) -> None:
+    """A leaf filter whose cake is as high as there is room: more crystals in it outweigh their resistance."""
+    text = DESIGN.replace("    rotation_rate_rpm: [0.1, 10]\n", "    filter_type: [leaf]\n") + "  turnaround_min: 60\n"
+    outcome = made(task_of(tmp_path, text), {2: (0.001, 0.002)})
+    tables = tabulate.tables(outcome)
+    assert (tables["search"]["cake_thickness_mm"] == pytest.approx(50.0)).all()
+    for table in (tables["search"], tables["levels"]):
+        assert (table["filter_area_low_m2"] <= table["filter_area_m2"]).all()
+        assert (table["filter_area_m2"] <= table["filter_area_high_m2"]).all()
+
+
 def test_pressed_packings_are_measured_at_every_pressure(tmp_path: Path) -> None:
     text = DESIGN.replace("    rotation_rate_rpm: [0.1, 10]\n", "    pressure_drop_kPa: [20, 80]\n")
     text = text.replace("adhesion_mJ_m2: 0", "adhesion_mJ_m2: 5")
