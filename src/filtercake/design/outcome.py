@@ -102,6 +102,11 @@ class Outcome:
         scaled = replace(self.problem, resistance=lambda place, porosity: factor * own(place, porosity))
         return find(scaled, self.belief)
 
+    def by_filter_type(self) -> Iterable[tuple[str, float]]:
+        """Yield the least objective with each filter type alone."""
+        for kind in self.problem.filter_types:
+            yield kind, find(replace(self.problem, filter_types=(kind,)), self.belief).value
+
     def by_other_costs(self) -> Iterable[tuple[str, Optimum]]:
         """Yield the best design by each other correlation of the best design's filter, with its name."""
         kind = self.optimum.choice.settings.filter_type

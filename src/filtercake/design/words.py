@@ -192,7 +192,16 @@ def _settings(outcome: Outcome) -> Iterator[str]:
         text = f"pressure drop {value / KILOPASCAL:.3g} kPa"
         yield text + _held(value, (float(pressures[0]), float(pressures[-1])), held)
     if len(outcome.problem.filter_types) > 1:
-        yield f"of the filter types asked for, the best is the {FILTERS[settings.filter_type]}"
+        yield f"filter types, each at its best: {_types(outcome)}"
+
+
+def _types(outcome: Outcome) -> str:
+    """Name the filter types asked for with the least objective of each, the best one first."""
+    name, found = outcome.problem.objective, list(outcome.by_filter_type())
+    return ", ".join(
+        f"{FILTERS[kind]} {amount(outcome, name, value) if np.isfinite(value) else 'none that keeps to the limits'}"
+        for kind, value in sorted(found, key=lambda item: item[1])
+    )
 
 
 def _held(value: float, ends: tuple[float, float], held: list[str]) -> str:

@@ -166,6 +166,19 @@ def test_beds_have_one_porosity_at_every_pressure(tmp_path: Path) -> None:
     assert outcome.optimum.choice.settings.pressure_drop == pytest.approx(80e3)
 
 
+def test_filter_types_stand_side_by_side(tmp_path: Path) -> None:
+    text = DESIGN.replace(
+        "  objective:", "    filter_type: [leaf, plate_and_frame, drum]\n  turnaround_min: 30\n  objective:"
+    )
+    outcome = packed(task_of(tmp_path, text), {})
+    values = dict(outcome.by_filter_type())
+    assert min(values.values()) == outcome.optimum.value
+    (said,) = (item for item in texts(outcome, "settings") if "filter types" in item)
+    order = sorted(values, key=lambda kind: values[kind])
+    places = [said.index({"leaf": "leaf filter", "drum": "drum"}.get(kind, "plate-and-frame")) for kind in order]
+    assert places == sorted(places) and outcome.optimum.choice.settings.filter_type == order[0]
+
+
 def test_the_ends_of_an_area_hold_it_where_a_denser_cake_needs_less(tmp_path: Path) -> None:
     """A leaf filter whose cake is as high as there is room: more crystals in it outweigh their resistance."""
     text = DESIGN.replace("    rotation_rate_rpm: [0.1, 10]\n", "    filter_type: [leaf]\n") + "  turnaround_min: 60\n"
