@@ -4,6 +4,7 @@ CORES ?= 2
 PROFILE ?=
 STUDIES ?=
 CALIBRATION ?= synthetic
+STUDY ?= fine_design
 REPORT ?= results/report.html
 SEED ?= 1
 FILTERCAKE_LAMMPS ?= results/benchmark/lammps
@@ -22,8 +23,9 @@ space := $() $()
 JOINED := $(subst $(space),$(comma),$(strip $(CALIBRATIONS)))
 REPORTED := $(if $(STUDIES)$(JOINED),--config $(if $(STUDIES),studies=$(STUDIES)) $(if $(JOINED),calibrations=$(JOINED)))
 
-# a calibration where one is named, studies otherwise
-RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(CONFIG),calibrate --config calibrations=$(CALIBRATION))
+DESIGNED := design --config studies=$(STUDY)
+# a calibration or a design where one is named, studies otherwise
+RESUMED := $(if $(filter file,$(origin CALIBRATION)),$(if $(filter file,$(origin STUDY)),$(CONFIG),$(DESIGNED)),calibrate --config calibrations=$(CALIBRATION))
 
 PERMEABILITY = $(BIN)/python -m filtercake.validation.permeability_page --folder results/benchmark/permeability \
 	--docs docs --template workflow/report/permeability.md.j2
@@ -44,8 +46,9 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 TAKES_run := STUDIES
 TAKES_figures := STUDIES
 TAKES_retry := STUDIES
-TAKES_resume := STUDIES CALIBRATION
+TAKES_resume := STUDIES CALIBRATION STUDY
 TAKES_calibrate := CALIBRATION
+TAKES_design := STUDY
 TAKES_report := STUDIES CALIBRATIONS REPORT
 TAKES_benchmark := QUICK
 TAKES_stability := QUICK
@@ -56,7 +59,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 UNKNOWN := $(filter-out $(TAKEN) VENV PYTHON FILTERCAKE_% MAKE%,$(GIVEN))
 $(if $(UNKNOWN),$(error $(UNKNOWN) is no variable of `make $(MAKECMDGOALS)`; it takes $(TAKEN)))
 
-.PHONY: run report browser benchmark stability permeability pressure emulator pages faults reference calibrate test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement lammps twin leaf-tests synthetic bed-size flow-speed references resume retry lock setup clean help
+.PHONY: run report browser benchmark stability permeability pressure emulator pages faults reference calibrate design design-grid test test-all slurm-test lint check-types check-style check-workflow kernels format schemas figures fuzz regression speed growth agreement lammps twin leaf-tests synthetic bed-size flow-speed references resume retry lock setup clean help
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1: /p' $(MAKEFILE_LIST)
@@ -111,6 +114,9 @@ schemas: setup ## regenerate the JSON schemas and the reference of config keys
 
 calibrate: setup ## fit the cohesion to measured resistances (CALIBRATION=name of a file in config/calibrations; synthetic, whose answer is known, if left out)
 	$(SNAKEMAKE) calibrate --config calibrations=$(CALIBRATION)
+
+design: setup ## find the best crystallizer and filter (STUDY=name of a study with the section design; fine_design, a made-up salt, if left out)
+	$(SNAKEMAKE) $(DESIGNED)
 
 figures: setup ## redraw the figures
 	$(SNAKEMAKE) $(CONFIG) --forcerun figure
@@ -198,6 +204,10 @@ twin: setup ## twenty calibrations whose answer is known, with and without frict
 leaf-tests: setup ## 200 synthetic filtration tests of each kind of fault: docs/data/leaf_tests.csv (about 2 min)
 	$(BIN)/python -m filtercake.validation.leaf_tests --output docs/data/leaf_tests.csv
 
+design-grid: setup ## every packing that the design of fine_design may ask for: docs/data/design_grid.csv (about 25 min on one core)
+	$(SNAKEMAKE) results/fine_grid/replicates.csv --config studies=config/benchmarks/fine_grid.yaml
+	install -m 644 results/fine_grid/replicates.csv docs/data/design_grid.csv
+
 bed-size: setup ## several beds of N = 25 000 against one of N = 100 000, alum (about 10 min)
 	$(SNAKEMAKE) bed_size
 
@@ -212,7 +222,7 @@ references: setup ## remake the stored LIGGGHTS trajectories that the tests comp
 	$(BIN)/python tests/data/force_scenes.py
 	$(BIN)/python tests/data/make_liggghts_data.py
 
-resume: setup ## go on after a kill, a crash or damage, with the same STUDIES or CALIBRATION; finished packings are kept
+resume: setup ## go on after a kill, a crash or damage, with the same STUDIES, CALIBRATION or STUDY; finished packings are kept
 	$(BIN)/python -m filtercake.run.resume $(PLACE) $(RESUMED)
 
 retry: setup ## make the packings that failed once more

@@ -20,6 +20,8 @@ include: "workflow/rules/resistance.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/common_calibration.smk"
 include: "workflow/rules/calibration.smk"
+include: "workflow/rules/common_design.smk"
+include: "workflow/rules/design.smk"
 include: "workflow/rules/report.smk"
 
 

@@ -23,6 +23,7 @@ from filtercake.calibration.config import LoadedCalibration, candidates, load_ca
 from filtercake.calibration.measurements import compressibility_table, fits_table
 from filtercake.cli import commands as cli
 from filtercake.crystals.csd import to_table
+from filtercake.design.loading import load_designs
 from filtercake.errors import FiltercakeError, PackingRejected
 from filtercake.study.loading import LoadedStudy, find_studies, load_studies, load_workflow
 from filtercake.study.points import Point, expand
@@ -74,8 +75,11 @@ def load_run(**values: Any) -> None:
     settings = load_workflow(values, CONFIG)
     studies = load_studies(find_studies(settings, STUDIES, CONFIG))
     calibrations = load_calibrations(settings.calibrations, CALIBRATIONS, STUDIES, CONFIG)
+    designs = load_designs(studies)
     for study in studies:
         _check_study(study, expand(study, _engine))
+    for design in designs.values():
+        json.dumps(design.params(_engine), allow_nan=False)
     for calibration in calibrations:
         _check_calibration(calibration)
 

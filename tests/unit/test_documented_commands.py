@@ -46,6 +46,7 @@ from filtercake.cli.commands import EXAMPLES as HELP_EXAMPLES
 from filtercake.cli.commands import build_parser, main
 from filtercake.crystals.crystallizer import load_kinetics
 from filtercake.design.costs import load_correlations
+from filtercake.design.loading import load_designs
 from filtercake.errors import ConfigError
 from filtercake.study import engine_choice
 from filtercake.study.loading import load_study, load_workflow
@@ -285,10 +286,11 @@ def load(path: Path, root: Path) -> None:
     """Check a file in the place it belongs to."""
     studies = root / "config" / "studies"
     loaders: dict[str, Callable[[Path], object]] = {
-        "config/studies": load_study,
+        "config/studies": lambda file: load_designs([load_study(file)]),
         "config/measurements": load_measurements,
         "config/calibrations": lambda file: load_calibration(file, studies),
         "config": load_kinetics,
+        "config/kinetics": load_kinetics,
         "config/costs": load_correlations,
     }
     loaders[str(path.parent.relative_to(root))](path)

@@ -72,6 +72,12 @@ try:
             STUDY_FILES,
             CONFIG_FILE,
         )
+    DESIGNS = {}
+    if any(study.model.design for study in STUDIES.values()):
+        # reads the models of the instant estimate, which other studies need not wait for
+        from filtercake.design.loading import load_designs
+
+        DESIGNS = load_designs(STUDIES.values())
     engine_choice.check([*STUDIES.values(), *(item.study for item in CALIBRATIONS)])
 except FiltercakeError as error:
     stop(error)
@@ -114,9 +120,16 @@ def cross_checked(study):
 
 @cache
 def everything_packed(study):
-    """What is packed for a study, and for its cross-check, by name."""
+    """What is packed for a study, for its design and for its cross-check, by name."""
     others = {other.name: other for _, other in cross_checked(study)}
-    return {**packings_of(study), **others}
+    return {**packed_for_design(study), **packings_of(study), **others}
+
+
+def packed_for_design(study):
+    """What may be packed for a study's design, by name."""
+    if study not in DESIGNS:
+        return {}
+    return packed(ask.point for ask in DESIGNS[study].asks(engine_choice.choose))
 
 
 def packed_of(wildcards):
@@ -177,8 +190,14 @@ def figures_of(study):
     return catalogue.figures_of(KNOWN_POINTS[study].values(), KNOWN[study].model)
 
 
-def csd_params(wildcards):
+def study_with_csd(wildcards):
+    """The study as it holds a distribution: its design has some of its own."""
     study = study_of(wildcards)
+    return study if wildcards.csd in study.csds else DESIGNS[wildcards.study].study
+
+
+def csd_params(wildcards):
+    study = study_with_csd(wildcards)
     csd, state = study.model.csds[wildcards.csd], study.csds[wildcards.csd].crystallizer
     found = {**csd.recipe, "truncation": csd.truncation}
     if state is not None:
@@ -188,7 +207,7 @@ def csd_params(wildcards):
 
 
 def csd_file(wildcards):
-    file = study_of(wildcards).csds[wildcards.csd].file
+    file = study_with_csd(wildcards).csds[wildcards.csd].file
     return [str(file)] if file else []
 
 

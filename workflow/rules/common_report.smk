@@ -1,4 +1,4 @@
-# What the rules of the report share: which studies and calibrations are in it, and where a page stands.
+# What the rules of the report share: which studies, designs and calibrations are in it, and where a page stands.
 from filtercake.report.catalogue import PAGES
 
 PAGE_TEMPLATE = str(ROOT / "workflow" / "report" / "page.html.j2")
@@ -37,6 +37,7 @@ def calibrations_reported():
 def report_pages(wildcards):
     calibrated = calibrations_reported()
     folders = [f"{RESULTS}/{name}" for name in [*STUDIES, *calibrated]]
+    folders += [f"{RESULTS}/{name}/design" for name in DESIGNS]
     documents = ["method", *(["calibration"] if calibrated else [])]
     return [
         *(f"{folder}/report/pages" for folder in folders),

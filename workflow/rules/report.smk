@@ -6,6 +6,7 @@ report: "../report/front.rst"
 
 
 ruleorder: calibration_pages > study_pages
+ruleorder: design_pages > study_pages
 
 
 DOCUMENTATION = {"method": "Method and assumptions", "calibration": "Calibration"}
@@ -53,6 +54,8 @@ rule study_pages:
         "{results}/{study}/logs/report.log",
     benchmark:
         "{results}/{study}/benchmarks/report.tsv"
+    wildcard_constraints:
+        results=re.escape(RESULTS),  # or <study>/design would be a study of a results folder <study>
     conda:
         "../envs/filtercake.yaml"
     resources:
@@ -114,6 +117,48 @@ rule calibration_pages:
         "report pages of {wildcards.calibration}"
     script:
         "../scripts/calibration_pages.py"
+
+
+rule design_pages:
+    input:
+        lambda wildcards: outputs_of_design(wildcards.study),
+        summary="{results}/{study}/design/design.json",
+        tables=expand(
+            "{{results}}/{{study}}/design/tables/{table}.csv", table=DESIGN_TABLES
+        ),
+        figures=lambda wildcards: [
+            file
+            for file in outputs_of_design(wildcards.study)
+            if file.endswith(".png")
+        ],
+        page=PAGE_TEMPLATE,
+        front=f"{CAPTION_TEMPLATES}/front_design.html.j2",
+        templates=caption_templates(),
+    output:
+        captions=directory("{results}/{study}/design/report/captions"),
+        pages=report(
+            directory("{results}/{study}/design/report/pages"),
+            patterns=["{page}.html"],
+            category=design_title,
+            subcategory=page_part,
+            labels=page_labels,
+        ),
+    log:
+        "{results}/{study}/logs/design/report.log",
+    benchmark:
+        "{results}/{study}/benchmarks/design/report.tsv"
+    conda:
+        "../envs/filtercake.yaml"
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        library=library("report.captions"),
+        study=lambda wildcards: study_of(wildcards).model.model_dump(mode="json"),
+    message:
+        "report pages of the design of {wildcards.study}"
+    script:
+        "../scripts/design_pages.py"
 
 
 rule documentation_page:

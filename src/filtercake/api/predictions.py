@@ -10,12 +10,11 @@ from filtercake.api.arguments import ORIGIN
 from filtercake.api.packings import as_packed_by_default
 from filtercake.api.predict_options import PredictOptions
 from filtercake.api.steps import Distribution, csd_name, load, resistance
+from filtercake.design.emulator import cake_of
 from filtercake.design.emulator_file import shipped
 from filtercake.errors import ConfigError, Problem
-from filtercake.filtration.compressible import CakeAverage, cake_average
 from filtercake.filtration.resistance import law_of
 from filtercake.packing.cloud import NARROW_PARTICLES, cell_for
-from filtercake.packing.compression import CompressionCurve
 from filtercake.packing.engines.embedded import Embedded
 from filtercake.packing.scene import FILTRATION_PROTOCOL, Scene
 from filtercake.results.resistance_columns import ALWAYS
@@ -100,8 +99,8 @@ def predict(source: Distribution, **options: Any) -> Prediction:
     scene = _as_large_as_packed(base_point(study, csd_name(study), engine_choice.choose).scene)
     model = shipped()[scene.protocol]
     found = model.estimate(scene)
-    cake = _cake(scene, found.curve)
-    half, packing_half = found.half_widths(lambda curve: _cake(scene, curve).porosity)
+    cake = cake_of(scene, found.curve)
+    half, packing_half = found.half_widths(lambda curve: cake_of(scene, curve).porosity)
     return Prediction(
         protocol=scene.protocol,
         porosity=cake.porosity,
@@ -134,11 +133,6 @@ def _study(source: Distribution, given: PredictOptions) -> LoadedStudy:
 def _as_large_as_packed(scene: Scene) -> Scene:
     """Give a pressed cell the spheres that ``pack`` would take, however many."""
     return replace(scene, particles=cell_for(scene.csd)) if scene.is_pressed else scene
-
-
-def _cake(scene: Scene, curve: CompressionCurve) -> CakeAverage:
-    """Average a pressed cake; a settled bed has one porosity."""
-    return cake_average(scene.load_over_strength if scene.is_pressed else math.inf, curve.at)
 
 
 def _finite(scene: Scene) -> float | None:

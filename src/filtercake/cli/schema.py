@@ -19,6 +19,7 @@ from filtercake.filtration.resistance import CARMAN
 from filtercake.packing.scene import FILTRATION_PROTOCOL
 from filtercake.study.config.cross_check import CrossCheck
 from filtercake.study.config.crystals import Crystallizer, Csd, Lognormal, RosinRammler, SizeClass
+from filtercake.study.config.design import Constraints, Costs, Design, Variables
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
@@ -37,6 +38,18 @@ EXAMPLES = {
     "medium_resistance_1_m": "5.0e+9",
 }
 """Values of the keys without a default, for the template, and of the law that a new study takes."""
+
+DESIGN_PARTS: dict[str, type[BaseModel]] = {"variables": Variables, "constraints": Constraints, "costs": Costs}
+"""Sections of the section ``design``."""
+EXAMPLES_OF_DESIGNS = {
+    "residence_time_min": "[15, 60]",
+    "slurry_concentration_kg_m3": "[100, 300]",
+    "pressure_drop_kPa": "[20, 80]",
+    "submerged_fraction": "[0.2, 0.4]",
+    "rotation_rate_rpm": "[0.1, 2]",
+    "cake_thickness_mm": "[5, 50]",
+}
+"""Ranges, for the template."""
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -109,6 +122,7 @@ def study_template() -> str:
         if key != "csd":
             lines.append(f"    # {meaning(field)}")
             lines.append(f"    # {key}: {'8' if key == 'replicates' else _example(key)}")
+    lines += _design_template()
     lines += [
         "",
         f"# {meaning(Study.model_fields['published'])}",
@@ -116,6 +130,22 @@ def study_template() -> str:
         "#   - {csd: mine, quantity: porosity, value: 0.36, source: my test, kind: measurement}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _design_template() -> list[str]:
+    """Section ``design``, every key of it behind a #."""
+    lines = ["", f"# {meaning(Study.model_fields['design'])}", "# design:"]
+    for key, field in Design.model_fields.items():
+        lines.append(f"  # {meaning(field)}")
+        part = DESIGN_PARTS.get(key)
+        if part is None:
+            lines.append(f"  # {key}: {EXAMPLES.get(key) or _yaml(field.get_default())}")
+            continue
+        lines.append(f"  # {key}:")
+        for name, inner in part.model_fields.items():
+            example = EXAMPLES_OF_DESIGNS.get(name) or _yaml(inner.get_default())
+            lines += [f"    # {meaning(inner)}", f"    # {name}: {example}"]
+    return lines
 
 
 def reference() -> str:
@@ -139,6 +169,10 @@ def reference() -> str:
         ("`permeability`", Permeability),
         ("`sweeps[]`", Sweep),
         ("`cross_check`", CrossCheck),
+        ("`design`", Design),
+        ("`design.variables`", Variables),
+        ("`design.constraints`", Constraints),
+        ("`design.costs`", Costs),
         ("`published[]`", Published),
         ("A calibration: `config/calibrations/<name>.yaml`", Calibration),
         ("`cohesion_kJ_m3` of a calibration", CohesionRange),
@@ -172,7 +206,8 @@ def _widen(node: Any) -> Any:
     """Let the schema accept what the model does: one value instead of a list of one."""
     if isinstance(node, dict):
         node = {key: _widen(value) for key, value in node.items()}
-        if node.get("type") == "array" and node.get("items", {}).get("type") in ("number", "string"):
+        of_one = node.get("type") == "array" and node.get("minItems", 0) < 2
+        if of_one and node.get("items", {}).get("type") in ("number", "string"):
             title = {key: node.pop(key) for key in ("title", "description", "default") if key in node}
             return {**title, "anyOf": [node, node["items"]]}
         return node

@@ -27,6 +27,7 @@ from filtercake.design.packing_features import (
     shape_features,
 )
 from filtercake.errors import ConfigError, Problem
+from filtercake.filtration.compressible import CakeAverage, cake_average
 from filtercake.packing.compression import CompressionCurve
 from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL, Scene
 from filtercake.statistics import quantile
@@ -79,6 +80,11 @@ MEANINGS: Final[dict[str, tuple[str, str, Callable[[float], float]]]] = {
 
 OfCurve = Callable[[CompressionCurve], float]
 """A number that follows from the porosity against the load."""
+
+
+def cake_of(scene: Scene, curve: CompressionCurve) -> CakeAverage:
+    """Average a pressed cake from its surface to the medium; a settled bed has one porosity."""
+    return cake_average(scene.load_over_strength if scene.is_pressed else math.inf, curve.at)
 
 
 def features_of(scene: Scene) -> FloatArray:

@@ -1,6 +1,7 @@
-"""Registry of the figures of studies and calibrations.
+"""Registry of the figures of studies, calibrations and designs.
 
-A new figure is one module with ``draw(data) -> Figure`` and one line in ``FIGURES`` or ``CALIBRATION_FIGURES``.
+A new figure is one module with ``draw(data) -> Figure`` and one line in ``FIGURES``, ``CALIBRATION_FIGURES`` or
+``DESIGN_FIGURES``.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from filtercake.calibration.measurements import Measurements, compressibility_by_csd
 from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL
+from filtercake.study.config.design import Design
 from filtercake.study.config.study import Study
 from filtercake.study.points import Point
 
@@ -30,7 +32,8 @@ class FigureSpec:
     module : str
         Its module.
     applies : callable
-        Whether it shows anything of a study's points, or of a calibration's predictions (True if any) and measurements.
+        Whether it shows anything of a study's points, of a calibration's predictions (True if any) and measurements, or
+        of a design's section.
     needs : callable
         Whether it shows anything of a study's model.
     of_tests : bool
@@ -147,7 +150,21 @@ CALIBRATION_FIGURES: dict[str, FigureSpec] = {
 }
 """Figures of calibrations."""
 
+DESIGN_FIGURES: dict[str, FigureSpec] = {
+    "design_objective": FigureSpec("Objective against residence time, and its parts", "design_objective"),
+    "design_resistance": FigureSpec("Filter area and resistance against residence time", "design_resistance"),
+    "design_trade_off": FigureSpec(
+        "Designs that are best in neither of two objectives alone",
+        "design_trade_off",
+        lambda design: design.trade_off is not None,
+    ),
+}
+"""Figures of designs."""
+EVERY_FIGURE = FIGURES | CALIBRATION_FIGURES | DESIGN_FIGURES
+
 ANSWERS = (
+    "design_objective",
+    "design_resistance",
     "fig14_resistance_area",
     "fig10_resistance_vs_cohesion",
     "cake_compression",
@@ -171,6 +188,11 @@ def figures_of_calibration(predicts: bool, measurements: Measurements) -> list[s
     return [name for name, spec in CALIBRATION_FIGURES.items() if spec.applies(predicts, measurements)]
 
 
+def figures_of_design(design: Design) -> list[str]:
+    """Names of the figures a design has."""
+    return [name for name, spec in DESIGN_FIGURES.items() if spec.applies(design)]
+
+
 def answering(figures: Collection[str]) -> list[str]:
     """List those of some figures that answer what was asked, and the cut through a packing behind them."""
     found = [name for name in ANSWERS if name in figures] or [name for name in (ANSWERS_ELSE,) if name in figures]
@@ -179,20 +201,20 @@ def answering(figures: Collection[str]) -> list[str]:
 
 def title_of(figure: str) -> str:
     """Title of a figure for readers."""
-    return (FIGURES | CALIBRATION_FIGURES)[figure].title
+    return EVERY_FIGURE[figure].title
 
 
 def module_of(figure: str) -> str:
     """Library module behind a figure, below ``filtercake``."""
-    return f"figures.{(FIGURES | CALIBRATION_FIGURES)[figure].module}"
+    return f"figures.{EVERY_FIGURE[figure].module}"
 
 
 def draw(figure: str, data: Any) -> Figure:
-    """Draw a figure of a study or a calibration from its ``StudyData`` or ``CalibrationData``."""
+    """Draw a figure from the ``StudyData``, ``CalibrationData`` or ``DesignData`` that it is of."""
     from filtercake.figures import style
 
     module = importlib.import_module(f"filtercake.{module_of(figure)}")
-    spec = (FIGURES | CALIBRATION_FIGURES)[figure]
+    spec = EVERY_FIGURE[figure]
     with style.applied():
         drawn: Figure = module.draw(data.measurements if spec.of_tests else data)
     return drawn

@@ -10,10 +10,12 @@ import pandas as pd
 from PIL import Image
 
 from filtercake.crystals.csd import kept_volume
+from filtercake.design.words import OBJECTIVES
 from filtercake.figures import calibrated, selection
 from filtercake.figures.calibrated import CalibrationData
 from filtercake.figures.catalogue import answering, title_of
 from filtercake.figures.cohesion import FREE
+from filtercake.figures.designed import DesignData, sentence
 from filtercake.figures.filtered import filtered
 from filtercake.figures.selection import StudyData
 from filtercake.figures.style import FOOTER
@@ -50,7 +52,7 @@ def write(templates: Path, figures: Iterable[Path], values: Mapping[str, Any], t
     figures : iterable of Path
         PNGs; each carries the line that stands below it.
     values : mapping
-        What the templates name (see :func:`study_values` and :func:`calibration_values`).
+        What the templates name (see :func:`study_values`, :func:`calibration_values` and :func:`design_values`).
     target : Path
         Folder of the captions.
     """
@@ -253,9 +255,32 @@ def calibration_values(data: CalibrationData) -> dict[str, Any]:
             {"label": data.label(str(row["csd"]), 200), "resistance": _range(row, "resistance")}
             for row in data.predictions.to_dict("records")
         ],
-        "findings": [f"{finding['text'][:1].upper()}{finding['text'][1:]}." for finding in data.summary["findings"]],
+        "findings": [sentence(finding["text"]) for finding in data.summary["findings"]],
         "ended": data.summary["ended"],
         "tests": len(given.tests) if given else 0,
+    }
+
+
+def design_values(data: DesignData) -> dict[str, Any]:
+    """Collect what captions and front page may say of a design.
+
+    Returns
+    -------
+    dict
+        ``kind``, ``name``, ``title``; ``law`` (of the resistance); ``counts``; ``objective`` and ``trade_off`` in
+        words; ``findings`` (sentences), the first of which is the answer; ``range`` (residence times, min).
+    """
+    times = data.search["residence_time_min"]
+    words = {name: OBJECTIVES.get(data.summary[name] or "", "") for name in ("objective", "trade_off")}
+    return {
+        "kind": "design",
+        "name": data.name,
+        "title": data.title or data.name,
+        "law": selection.law_title(data.summary["resistance_law"]),
+        "counts": packing_counts(data.packings),
+        **words,
+        "findings": [sentence(finding["text"]) for finding in data.summary["findings"]],
+        "range": (number(times.min(), 3), number(times.max(), 3)),
     }
 
 

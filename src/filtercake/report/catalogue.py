@@ -87,6 +87,38 @@ PAGES: dict[str, PageSpec] = {
         "interval over the packings, law low and high at those of the law's own.",
         "tables/filter.csv",
     ),
+    "levels": PageSpec(
+        TABLES,
+        "Packings of the design",
+        "Residence times that were packed: porosity by the packings, by the instant estimate beside it; resistance and "
+        f"filter area from the packings alone. {INTERVALS}",
+        "tables/levels.csv",
+    ),
+    "search": PageSpec(
+        TABLES,
+        "Best design at every residence time",
+        "Settings, sizes and costs; low and high are the ends of the 95 % interval that follows from what is known of "
+        "the porosity.",
+        "tables/search.csv",
+    ),
+    "costs": PageSpec(
+        TABLES,
+        "Cost correlations side by side",
+        "The best filter costed by every correlation of its kind, and the best design by each.",
+        "tables/costs.csv",
+    ),
+    "safety": PageSpec(
+        TABLES,
+        "Safety",
+        "What the filter may be designed for, and what each choice leaves out.",
+        "tables/safety.csv",
+    ),
+    "pareto": PageSpec(
+        TABLES,
+        "Trade-off of two objectives",
+        "Designs that no other one beats in both objectives.",
+        "tables/pareto.csv",
+    ),
     "parity": PageSpec(
         TABLES,
         "Measured and modelled resistances",

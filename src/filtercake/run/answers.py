@@ -1,7 +1,8 @@
-"""What a study found, as a small table for the terminal."""
+"""What a study found, as a small table for the terminal; what its design found, in words."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -41,6 +42,18 @@ def answers(folder: Path) -> Iterator[str]:
     yield from _aligned([titles, *rows])
     if len(points) > MOST_ROWS:
         yield f"... and {len(points) - MOST_ROWS} more in {summary}"
+
+
+def design_answers(file: Path) -> Iterator[str]:
+    """Say what a study's design found, from its record.
+
+    Yields
+    ------
+    str
+        One line per finding, what it is about first.
+    """
+    for finding in json.loads(file.read_text(encoding="utf-8"))["findings"]:
+        yield f"{finding['kind']}: {finding['text']}"
 
 
 def _found(point: Row) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from filtercake.packing.pack import MANIFEST
 from filtercake.results.tables import read_table
-from filtercake.run.answers import answers
+from filtercake.run.answers import answers, design_answers
 from filtercake.run.job import failure_reason
 from filtercake.study.points import Point
 
@@ -18,6 +18,9 @@ SHOWN = 5
 
 REPORT = "report.html"
 """Name of the report in the folder of the results, where ``make report`` puts it."""
+
+NUMBERS = ("summary.csv", "calibration.json", "design/design.json")
+"""Files of a study or calibration that the report shows."""
 
 CHATTER = ("Select jobs to execute", "Execute ", "Loading script code", "Adding ")
 """Starts of Snakemake's lines that come again with every job or file; its log keeps them."""
@@ -69,6 +72,10 @@ def success(results: Path, points: Points) -> str:
         if answer.exists():
             made["numbers"] = answer
             lines += ["", *(f"{study}: {line}" for line in _answer(answer))]
+        chosen = folder / "design" / "design.json"
+        if chosen.exists():
+            made["design"] = chosen.parent
+            lines += ["", *(f"{study}: {line}" for line in design_answers(chosen))]
         table = list(answers(folder))
         if table:
             lines += ["", f"{study}, +- the half-width of the 95 % interval over the packings:"]
@@ -93,7 +100,7 @@ def _report(results: Path, studies: Iterable[str]) -> Iterator[str]:
     if not report.exists():
         return
     made = report.stat().st_mtime
-    numbers = [results / study / name for study in studies for name in ("summary.csv", "calibration.json")]
+    numbers = [results / study / name for study in studies for name in NUMBERS]
     older = any(path.exists() and path.stat().st_mtime > made for path in numbers)
     yield f"report: {report}{' (older than these results: make report)' if older else ''}"
 

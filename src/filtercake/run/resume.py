@@ -29,7 +29,7 @@ from filtercake.user_files import read_yaml
 
 GRACE_SECONDS = 15.0
 """Wall time that a process left over has to end by itself."""
-MADE = ("*.csv", "*.json", "csd/*", "tables/*", "figures/*", "rounds/*")
+MADE = ("*.csv", "*.json", "csd/*", "tables/*", "figures/*", "rounds/*", "design/*.json", "design/*/*")
 """What the jobs of a study or calibration make in its folder, besides packings."""
 CONFIG_FILE = "config/config.yaml"
 

@@ -10,6 +10,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from designs import made as make_design
+from designs import task_of
+from designs import written as write_design
 from matplotlib.figure import Figure
 from PIL import Image
 from test_alum_figures import STUDIES
@@ -20,7 +23,8 @@ from test_figures import POINTS
 from test_figures import make as make_study
 
 from filtercake.figures.calibrated import CalibrationData, with_interval
-from filtercake.figures.catalogue import CALIBRATION_FIGURES, FIGURES, answering, title_of
+from filtercake.figures.catalogue import CALIBRATION_FIGURES, DESIGN_FIGURES, EVERY_FIGURE, FIGURES, answering, title_of
+from filtercake.figures.designed import DesignData
 from filtercake.figures.selection import StudyData
 from filtercake.figures.style import panels, save
 from filtercake.report import captions, markdown, pages, words
@@ -167,7 +171,7 @@ def test_the_figures_that_answer_come_first(figures: list[str], shown: list[str]
 
 
 def test_every_figure_has_a_title_of_its_own() -> None:
-    titles = [title_of(name) for name in (*FIGURES, *CALIBRATION_FIGURES)]
+    titles = [title_of(name) for name in EVERY_FIGURE]
     assert len(set(titles)) == len(titles)
     assert all("_" not in title and title[0].isupper() and len(title) < 60 for title in titles)
     for name in FIGURES:
@@ -222,6 +226,26 @@ def test_every_figure_of_a_calibration_has_a_caption_with_n_and_engine(
     for text in (caption, front):
         assert f"n = {good} packings" in text and "engine" in text and value in text
     assert FOOTER in caption
+
+
+@pytest.fixture(scope="module")
+def design(tmp_path_factory: pytest.TempPathFactory) -> DesignData:
+    folder = tmp_path_factory.mktemp("design")
+    outcome = make_design(task_of(folder), {2: (0.003, 0.001, 0.004), 3: (0.002, 0.003, float("nan"))})
+    return DesignData.read("mine", "A design", *write_design(outcome, folder / "design"))
+
+
+@pytest.mark.parametrize("figure", DESIGN_FIGURES)
+def test_every_figure_of_a_design_has_a_caption_with_n_and_engine(
+    figure: str, design: DesignData, tmp_path: Path
+) -> None:
+    caption, front = written(tmp_path, figure, captions.design_values(design))
+    for text in (caption, front):
+        assert "n = 5 packings" in text and "1 failed" in text and "embedded engine" in text
+    assert FOOTER in caption
+    assert front.count("<li>") == len(design.summary["findings"])
+    answer = design.summary["findings"][0]["text"]
+    assert answer[1:50] in front and (figure == "design_trade_off" or answer[1:50] in caption)
 
 
 def test_failed_packings_are_listed_with_their_reasons(made_up: StudyData, tmp_path: Path) -> None:

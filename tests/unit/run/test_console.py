@@ -48,6 +48,16 @@ def test_a_study_ends_with_its_numbers(tmp_path: Path) -> None:
     assert said[6:] == [f"mine: numbers in {folder}/summary.csv"]
 
 
+def test_a_design_ends_with_its_answer_in_words(tmp_path: Path) -> None:
+    folder = study_of(tmp_path / "mine", 1)
+    (folder / "design").mkdir()
+    findings = [{"kind": "optimum", "text": "the least is here"}, {"kind": "medium", "text": "it decides"}]
+    (folder / "design" / "design.json").write_text(json.dumps({"findings": findings}))
+    said = console.success(tmp_path, {"mine": {}}).splitlines()
+    assert said[:3] == ["", "mine: optimum: the least is here", "mine: medium: it decides"]
+    assert said[-1] == f"mine: numbers in {folder}/summary.csv, design in {folder}/design"
+
+
 def test_a_single_packing_has_no_interval(tmp_path: Path) -> None:
     _, row = answers(study_of(tmp_path, 1, porosity_ci95=[np.nan], resistance_ci95_m_kg=[np.nan]))
     assert cells(row) == ["p0", "0.35 +- -", "1.5e+09 +- -"]

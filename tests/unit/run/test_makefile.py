@@ -26,6 +26,7 @@ def make(*words: str) -> subprocess.CompletedProcess[str]:
         (["calibrate", "CALIBRATIONS=a"], "it takes CORES PROFILE CALIBRATION."),
         (["report", "CALIBRATION=a"], "it takes CORES PROFILE STUDIES CALIBRATIONS REPORT"),
         (["run", "CALIBRATION=a"], "CALIBRATION is no variable"),
+        (["design", "STUDIES=a"], "STUDIES is no variable of `make design`; it takes CORES PROFILE STUDY"),
         (["benchmark", "QIUCK=1"], "it takes CORES PROFILE QUICK"),
     ],
 )
@@ -52,6 +53,13 @@ def test_a_variable_that_is_used_is_none(words: list[str]) -> None:
 
 def test_a_report_s_name_may_hold_a_blank() -> None:
     assert '--report "my report.html"' in make("report", "REPORT=my report.html").stdout
+
+
+def test_a_design_is_that_of_the_study_named_and_resumed_as_such() -> None:
+    assert make("design").stdout.splitlines()[-1].endswith("design --config studies=fine_design")
+    for goal in ("design", "resume"):
+        assert make(goal, "STUDY=mine").stdout.splitlines()[-1].endswith("design --config studies=mine")
+    assert "design" not in make("resume").stdout.splitlines()[-1]
 
 
 def test_a_calibration_without_a_name_is_the_synthetic_one() -> None:

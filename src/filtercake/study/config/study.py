@@ -9,6 +9,7 @@ from pydantic import Field
 from filtercake.filtration.resistance import ADDITIVE
 from filtercake.study.config.cross_check import CrossCheck
 from filtercake.study.config.crystals import Crystallizer, Csd
+from filtercake.study.config.design import Design
 from filtercake.study.config.filter import Filter
 from filtercake.study.config.material import Material
 from filtercake.study.config.packing import Packing
@@ -47,6 +48,10 @@ class Study(Model):
     )
     cross_check: CrossCheck | None = Field(
         default=None, description="Packings made once more by another engine, and how the porosities differ."
+    )
+    design: Design | None = Field(
+        default=None,
+        description="Which residence time, which filter, at what cost, how sure; needs a crystallizer and a filter.",
     )
     published: Annotated[list[Published], Field(max_length=MOST_VALUES)] = Field(
         default=[], description="Published values to show beside ours."
