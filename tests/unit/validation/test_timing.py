@@ -51,17 +51,20 @@ def test_the_warm_up_finds_room_whatever_the_distribution(initial_void_fraction:
 
 def test_ratios_and_intervals_of_made_up_timings() -> None:
     rows = [
-        {"engine": engine, "particles": 10, "wall_s": wall, "status": status, "porosity": porosity, "peak_memory_MB": 1}
-        for engine, wall, status, porosity in (
-            ("slow", 100.0, "ok", 0.350),
-            ("fast", 2.0, "ok", 0.351),
-            ("slow", 110.0, "ok", 0.352),
-            ("fast", 2.2, "not settled", 0.353),
+        {"engine": engine, "replicate": k, "wall_s": wall, "status": status, "porosity": porosity}
+        for engine, k, wall, status, porosity in (
+            ("slow", 0, 100.0, "ok", 0.350),
+            ("fast", 0, 2.0, "ok", 0.351),
+            ("slow", 1, 110.0, "ok", 0.352),
+            ("fast", 1, 2.5, "not settled", 0.353),
         )
     ]
+    rows = [{**row, "particles": 10, "peak_memory_MB": 1} for row in rows]
     slow, fast = compare(pd.DataFrame(rows)).to_dict("records")
     assert (slow["engine"], slow["times_faster"]) == ("slow", 1.0)
-    assert fast["times_faster"] == pytest.approx(105.0 / 2.1)
+    assert fast["times_faster"] == pytest.approx(105.0 / 2.25)
+    # of packings made right after each other
+    assert (fast["times_faster_low"], fast["times_faster_high"]) == pytest.approx((110.0 / 2.5, 100.0 / 2.0))
     assert fast["n_not_accepted"] == 1
     assert fast["difference"] == pytest.approx(0.001)
     # equal spreads of two each: Welch's two degrees of freedom, t = 4.3027, standard errors of 0.0014142 / sqrt(2)
