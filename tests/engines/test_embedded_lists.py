@@ -92,6 +92,23 @@ def test_a_bullet_through_a_cloud_at_rest_meets_what_it_meets(speed, seed, size)
         assert touching(bed) <= near(bed)
 
 
+def test_a_sphere_that_crosses_the_box_meets_every_image():
+    """Again and again through a narrow box in the steps that a list may last, past a sphere that lies a little aside."""
+    side, radius, speed = 60e-6, 10e-6, 20.0
+    position = np.array([[15e-6, 30e-6, 60e-6], [45e-6, 30e-6, 60e-6 + 1.99 * radius]])
+    velocity = np.array([[speed, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    scene = scene_of(CrystalSizeDistribution.from_classes([20e-6], [1.0]), 2)
+    bed = Bed(position, velocity, np.full(2, radius), side, scene, gravity=0.0)
+    bed.mass *= 1e6  # so that meeting turns it aside by nothing
+    assert speed * scene.time_step * embedded_bed.LISTING_STEPS > 2.0 * side
+    laps = set()
+    for step in range(embedded_bed.LISTING_STEPS):
+        bed.advance(1)
+        assert touching(bed) <= near(bed)
+        laps |= {int(speed * step * scene.time_step / side) for _ in touching(bed)}
+    assert len(laps) > 3
+
+
 def test_few_that_fly_about_do_not_shorten_the_list_of_those_at_rest():
     side, n = 400e-6, 8
     grid = (np.array([(x, y, z) for z in range(n) for y in range(n) for x in range(n)]) + 0.5) * side / n

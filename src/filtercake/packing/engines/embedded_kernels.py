@@ -247,6 +247,8 @@ COMMON_ROOM = 0.1
 """Limit of a patch's speeds: so many times its fastest sphere's, and so many times that of the whole bed's."""
 LOCAL_ROOM = 0.6
 """Part of the largest speed in its patch at which a sphere may leave its course for as long as a list lasts."""
+MOST_ROOM = 0.25
+"""Most room of a sphere over the side of the box: only the nearest image of another is looked for."""
 SURE_ROOM = 1.25
 """Room over what a first choice of near pairs may need: a list that is new lasts at least that long."""
 
@@ -501,7 +503,7 @@ def give_room(state: FloatArray, law: Law, least: float, listing: Listing) -> No
         limit, astray = patches.limit[i // PATCH], abs(patches.speed[i // PATCH] - half)
         needed = lasts * (math.sqrt(u * u + v * v + half * half) + LOCAL_ROOM * limit)
         course[i] = half * law.time_step
-        room[i] = max(least + needed, SURE_ROOM * first * (astray + limit))
+        room[i] = max(min(least + needed, MOST_ROOM * law.length), SURE_ROOM * first * (astray + limit))
 
 
 @_compiled
