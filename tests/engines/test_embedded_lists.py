@@ -93,7 +93,7 @@ def test_a_bullet_through_a_cloud_at_rest_meets_what_it_meets(speed, seed, size)
 
 
 def test_a_sphere_that_crosses_the_box_meets_every_image():
-    """Again and again through a narrow box in the steps that a list may last, past a sphere that lies a little aside."""
+    """Again and again through a narrow box while a list may last, past a sphere that lies a little aside."""
     side, radius, speed = 60e-6, 10e-6, 20.0
     position = np.array([[15e-6, 30e-6, 60e-6], [45e-6, 30e-6, 60e-6 + 1.99 * radius]])
     velocity = np.array([[speed, 0.0, 0.0], [0.0, 0.0, 0.0]])

@@ -582,6 +582,7 @@ rule benchmark_page:
             expand("{folder}/errors/{case}.csv", folder=BENCHMARK, case=ERROR_CASES),
         ),
         reference=str(DATA / "reference_replicates.csv"),
+        stored=sorted(str(path) for path in DATA.glob("*.csv")),
         choices=tables_of_page(str(DATA / "choices.csv"), f"{BENCHMARK}/choices.csv"),
         answers=tables_of_page(str(DATA / "answers.csv"), f"{BENCHMARK}/answers.csv"),
         template=str(ROOT / "workflow" / "report" / "benchmark.md.j2"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -47,6 +47,15 @@ class Toy(Engine):
 
 
 @pytest.fixture(autouse=True)
+def as_they_were() -> Iterator[None]:
+    """Leave the engines in the order in which they were."""
+    known = dict(ENGINES)
+    yield
+    ENGINES.clear()
+    ENGINES.update(known)
+
+
+@pytest.fixture(autouse=True)
 def _registered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(ENGINES, Toy.name, Toy)
 
@@ -71,8 +80,7 @@ def test_the_configuration_takes_it(
 def test_auto_takes_it_only_where_it_says_so(make_scene: Callable[..., Scene], monkeypatch: pytest.MonkeyPatch) -> None:
     scene = make_scene(engine=AUTO)
     monkeypatch.setenv("FILTERCAKE_LIGGGHTS", "/no/such/liggghts")
-    monkeypatch.delitem(ENGINES, "embedded")
-    monkeypatch.setitem(ENGINES, "embedded", Embedded)  # now after the toy
+    ENGINES["embedded"] = ENGINES.pop("embedded")  # now after the toy
     assert engine_choice.choose(scene) == "embedded"
     monkeypatch.setattr(Toy, "suits", classmethod(lambda _cls, scene: scene.particles < 1000))
     assert engine_choice.choose(scene) == "toy"
