@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 from functools import cache
 
-from filtercake.crystals.csd import read_tables
+from filtercake.crystals.csd import read_table
 from filtercake.figures import catalogue
 from filtercake.packing.engines.base import parallelism
 from filtercake.packing.pack import MANIFEST, count_kept, point_key
@@ -302,7 +302,7 @@ def missing_packings(study, point):
     packings = folder / "packings" / point.name
     if not (packings.is_dir() and table.is_file()):
         return point.replicates
-    _, csd = read_tables([table])[point.csd]
+    _, csd = read_table(table)
     key = point_key(packing_code(point.scene.engine), replace(point.scene, csd=csd))
     return point.replicates - count_kept(packings, key, point.replicates)
 

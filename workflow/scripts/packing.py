@@ -3,9 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-import pandas as pd
-
-from filtercake.crystals.csd import from_table
+from filtercake.crystals.csd import read_table
 from filtercake.packing.pack import pack_replicates
 from filtercake.packing.replication import UntilNarrow
 from filtercake.packing.scene import Scene
@@ -28,7 +26,7 @@ def main(table, asked, manifest, point, logger):
         logger.info(line)
         progress.note(f"{point} {line}")
 
-    _, truncated = from_table(pd.read_csv(table))
+    _, truncated = read_table(table)
     # sizes as the table has them: what is packed is what the resistance is computed for
     scene = replace(Scene.from_dict({**asked.scene, **asked.incidental}), csd=truncated)
     enough = UntilNarrow(scene, asked.interval, asked.replicates) if asked.interval else lambda _: False

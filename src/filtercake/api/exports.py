@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from filtercake.api.measured import PackingPorosity, porosity
-from filtercake.crystals.csd import FullAndTruncated, from_table, to_table
+from filtercake.crystals.csd import FullAndTruncated, columns, from_table, read_table, to_table
 from filtercake.errors import ConfigError, FiltercakeError, PackingRejected, Problem
 from filtercake.packing.cloud import make_cloud
 from filtercake.packing.engines import ENGINES, SettleRequest
@@ -160,10 +159,10 @@ def _choose(outcomes: dict[int, dict[str, Any]]) -> int:
 def _sizes(study: LoadedStudy, point: Point, made: Path) -> FullAndTruncated:
     """Sizes as the packing's job read them: those of the table, whose last digits decide the seed."""
     try:
-        return from_table(pd.read_csv(made / "csd" / f"{point.csd}.csv"))
+        return read_table(made / "csd" / f"{point.csd}.csv")
     except (OSError, ValueError, FiltercakeError):
         csd = study.csds[point.csd]
-        return from_table(to_table(csd.full, csd.truncated))
+        return from_table(columns(csd.full, csd.truncated))
 
 
 def _write(

@@ -6,7 +6,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,6 +19,7 @@ from filtercake.crystals.csd import (
     kept_volume,
     mixture,
     read_csd,
+    read_table,
     to_table,
     truncate,
 )
@@ -284,7 +284,7 @@ def test_a_table_keeps_what_the_classes_add_to_the_sums(tmp_path: Path) -> None:
     csd = discretise(lambda size: size / (10 * UM), 10 * UM, 2.5 * UM, lambda size: (sums[0](size), sums[1](size)))
     assert (csd.sum_x_over_d, csd.sum_x_over_d2) == pytest.approx((3e5, 4e10), rel=1e-14)
     to_table(csd, truncate(csd, largest=8 * UM).csd).to_csv(tmp_path / "csd.csv", index=False)
-    full, truncated = from_table(pd.read_csv(tmp_path / "csd.csv"))
+    full, truncated = read_table(tmp_path / "csd.csv")
     assert full.x_over_d2 == pytest.approx(csd.x_over_d2)
     assert (full.sum_x_over_d, full.sum_x_over_d2) == pytest.approx((3e5, 4e10), rel=1e-14)
     assert truncated.x_over_d is None
@@ -306,9 +306,9 @@ def test_the_same_table_on_disk_is_the_same_distribution(tmp_path: Path, alum) -
     # the packing reads what the csd rule wrote: the cloud's seed hashes 13 digits of it
     full, cut = alum(15)
     to_table(full, cut.csd).to_csv(tmp_path / "csd.csv", index=False)
-    full_again, first = from_table(pd.read_csv(tmp_path / "csd.csv"))
+    full_again, first = read_table(tmp_path / "csd.csv")
     to_table(full_again, first).to_csv(tmp_path / "again.csv", index=False)
-    again = from_table(pd.read_csv(tmp_path / "again.csv"))[1]
+    again = read_table(tmp_path / "again.csv")[1]
     assert first.size.size == cut.csd.size.size
     assert first.volume_fraction == pytest.approx(cut.csd.volume_fraction, rel=1e-12)
     assert again.volume_fraction == pytest.approx(first.volume_fraction, rel=1e-12)

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtercake.crystals.csd import from_table, mixture, to_table
+from filtercake.crystals.csd import mixture, read_table, to_table
 from filtercake.filtration.resistance import (
     CARMAN,
     CARMAN_CONSTANT,
@@ -248,7 +248,7 @@ def test_clouds_differ_by_replicate_distribution_number_void_fraction_and_base_s
 def test_a_cloud_s_seed_outlives_a_csv_round_trip(make_scene, pmma, tmp_path: Path) -> None:
     csd = mixture([20.1 * UM, 33.3 * UM, 50 * UM], [1 / 3, 1 / 7, 1 - 1 / 3 - 1 / 7])
     to_table(csd, csd).to_csv(tmp_path / "csd.csv", index=False)
-    _, again = from_table(pd.read_csv(tmp_path / "csd.csv"))
+    _, again = read_table(tmp_path / "csd.csv")
     assert cloud_seed(make_scene(csd=again), 0) == cloud_seed(make_scene(csd=csd), 0)
 
 
