@@ -101,32 +101,14 @@ def _gather_turning(begin: int, end: int, bodies: Bodies, pairs: Pairs, rows: Fl
 
 
 @_compiled
-def _push(begin: int, count: int, constants: FloatArray, law: Law, attraction: int, rows: FloatArray) -> None:
-    """Take the normal force, attraction included, over the distance of the centres, N/m; nought where none touch."""
-    literally(attraction)
-    lens_factor, pull_factor = 0.25 * math.pi * law.cohesion, 0.375 * math.pi * law.adhesion
-    stiffness, damping = constants[STIFFNESS], constants[DAMPING]
-    for c in range(count):
-        dx, dy, dz, total, unlike = rows[_DX + c], rows[_DY + c], rows[_DZ + c], rows[_TOTAL + c], rows[_UNLIKE + c]
-        square = dx * dx + dy * dy + dz * dz
-        r = math.sqrt(square)
-        inverse = 1.0 / r
-        overlap = max(total - r, 0.0)
-        root = math.sqrt(overlap)
-        normal = stiffness[begin + c] * (overlap * root)
-        normal -= damping[begin + c] * math.sqrt(root) * (rows[_OPENING + c] * inverse)
-        if attraction == COHESION:
-            lens = overlap * (total + r) * (square - unlike * unlike)
-            normal -= lens_factor * lens * (inverse * inverse)
-        if attraction == ADHESION:  # of the reduced radius, ri rj / (ri + rj)
-            normal -= pull_factor * (total * total - unlike * unlike) / total if overlap > 0.0 else 0.0
-        rows[_PUSH + c] = normal * inverse
+def _normal(
+    begin: int, count: int, constants: FloatArray, law: Law, attraction: int, frictional: bool, rows: FloatArray
+) -> None:
+    """Take the normal force, N, attraction included; nought where none touch.
 
-
-@_compiled
-def _normal(begin: int, count: int, constants: FloatArray, law: Law, attraction: int, rows: FloatArray) -> None:
-    """As above, with all that friction needs of it."""
-    literally(attraction)
+    Without friction it is left over the distance of the centres, N/m; with it, so is all that friction needs of it.
+    """
+    literally(attraction), literally(frictional)
     lens_factor, pull_factor = 0.25 * math.pi * law.cohesion, 0.375 * math.pi * law.adhesion
     stiffness, damping = constants[STIFFNESS], constants[DAMPING]
     for c in range(count):
@@ -143,13 +125,16 @@ def _normal(begin: int, count: int, constants: FloatArray, law: Law, attraction:
         if attraction == COHESION:
             lens = overlap * (total + r) * (square - unlike * unlike)
             push -= lens_factor * lens * (inverse * inverse)
-        if attraction == ADHESION:
+        if attraction == ADHESION:  # of the reduced radius, ri rj / (ri + rj)
             push -= pull_factor * (total * total - unlike * unlike) / total if overlap > 0.0 else 0.0
-        rows[_PUSH + c], rows[_INVERSE + c] = push, inverse
-        rows[_NORMAL + c], rows[_SPEED + c] = normal, speed
-        rows[_SPRING + c], rows[_DAMPER + c] = stiffness[begin + c] * root, damper
-        rows[_ARM + c], rows[_OTHER_ARM + c] = 0.5 * (total + unlike - overlap), 0.5 * (total - unlike - overlap)
-        rows[_TOUCHING + c] = 1.0 if overlap > 0.0 else 0.0
+        if frictional:
+            rows[_PUSH + c], rows[_INVERSE + c] = push, inverse
+            rows[_NORMAL + c], rows[_SPEED + c] = normal, speed
+            rows[_SPRING + c], rows[_DAMPER + c] = stiffness[begin + c] * root, damper
+            rows[_ARM + c], rows[_OTHER_ARM + c] = 0.5 * (total + unlike - overlap), 0.5 * (total - unlike - overlap)
+            rows[_TOUCHING + c] = 1.0 if overlap > 0.0 else 0.0
+        else:
+            rows[_PUSH + c] = push * inverse
 
 
 @_compiled
@@ -272,10 +257,10 @@ def pair_forces(
         _gather(here, stop, bodies.state, pairs, shift, rows)
         if frictional:
             _gather_turning(here, stop, bodies, pairs, rows)
-            _normal(here, count, pairs.near_constants, law, attraction, rows)
+        _normal(here, count, pairs.near_constants, law, attraction, frictional, rows)
+        if frictional:
             _tangential(count, law, spring_step, rows)
             _give_turning(part, here, stop, bodies, pairs, rows)
         else:
-            _push(here, count, pairs.near_constants, law, attraction, rows)
             _give_push(part, here, stop, bodies, pairs, rows)
         here = stop
