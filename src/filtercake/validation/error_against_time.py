@@ -169,6 +169,19 @@ class _Maker:
             for value, n in given.items()
         ]
 
+    def narrower(self, given: Mapping[int, int]) -> list[Variant]:
+        """Fewer spheres in a narrower box, as deep: what the porosity depends on stays."""
+        return [
+            self.one(
+                "narrower bed",
+                particles,
+                replicates,
+                particles=particles,
+                bed_depth_factor=self.base.bed_depth_factor * math.sqrt(self.base.particles / particles),
+            )
+            for particles, replicates in given.items()
+        ]
+
     def truncations(self, given: Mapping[float, int]) -> list[Variant]:
         found = []
         for value, replicates in given.items():
@@ -208,6 +221,7 @@ def _pmma(make: _Maker) -> list[Variant]:
     listed = [make.default(32)]
     listed += make.time_steps({0.06: 4, 0.12: 6, 0.2: 8, 0.36: 16, 0.65: 16, 0.8: 16, 0.95: 16})
     listed += [make.one("spheres", n, k, particles=n) for n, k in {500: 32, 1000: 24, 4000: 8}.items()]
+    listed += make.narrower({500: 32, 1000: 24})
     listed += [make.one("stop tolerance", value, 12, porosity_tolerance=value) for value in (1e-3, 3e-4, 3e-5)]
     listed += [make.one("skin", value, 8, skin=value * MICROMETRE) for value in (1.0, 5.0)]
     listed += make.softer({2.5: 16, 1.0: 16})
@@ -235,6 +249,8 @@ def _alum(make: _Maker) -> list[Variant]:
 
 def _alum_wide(make: _Maker) -> list[Variant]:
     listed = [make.default(12)]
+    listed += make.time_steps({0.65: 8, 0.8: 8})
+    listed += make.narrower({5000: 24, 10_000: 16})
     return listed + make.as_published(1, AS_PUBLISHED_STEP["alum"], ALUM_STEPS, ALUM_SKIN)
 
 

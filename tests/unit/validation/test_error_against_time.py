@@ -152,6 +152,7 @@ def test_variants_differ_from_the_default_in_what_they_say(case: str) -> None:
     changed = {
         "time step": {"time_step"},
         "spheres": {"particles"},
+        "narrower bed": {"particles", "bed_depth_factor"},
         "stop tolerance": {"porosity_tolerance"},
         "skin": {"skin"},
         "softer contacts": {"youngs_modulus", "cohesion", "time_step"},
@@ -176,6 +177,11 @@ def test_softer_contacts_keep_the_sticking_speed() -> None:
             ratio = (scene.cohesion / SCENE.cohesion) ** 5 / (scene.youngs_modulus / SCENE.youngs_modulus) ** 4
             assert ratio == pytest.approx(1.0)  # v^2 = 37 s^5/(rho E*^4)
             assert scene.rayleigh_fraction == pytest.approx(SCENE.rayleigh_fraction)
+
+
+def test_a_narrower_bed_is_as_deep() -> None:
+    heights = [v.contender.scene.cloud_height for v in variants("pmma", SCENE, CSD) if v.axis == "narrower bed"]
+    assert heights == pytest.approx([SCENE.cloud_height] * 2)
 
 
 def test_a_quick_run_is_short() -> None:

@@ -88,6 +88,15 @@ def test_the_headline_compares_with_the_papers_own_estimator() -> None:
     assert found["same_error_times_faster"] == pytest.approx(800.0)
 
 
+def test_a_single_packing_as_published_is_as_good_as_its_bias() -> None:
+    rows = error_rows()
+    published = (rows["axis"] == "as published") & (rows["estimator"] == "count")
+    rows.loc[published, ["error", "bias"]] = [np.nan, -0.0026]
+    found = pages.headline(rows)
+    assert found["same_error"]["axis"] == "default"
+    assert found["same_error_times_faster"] == pytest.approx(200.0)
+
+
 def test_without_the_published_protocol_there_is_no_ratio() -> None:
     rows = error_rows()
     assert set(pages.headline(rows[rows["axis"] != "as published"])) == {"default"}

@@ -21,7 +21,16 @@ CASES = {
     "alum": "Alum 15 min, N = 4000",
     "alum_wide": "Alum 15 min, N = 20 000",
 }
-AXES = ("time step", "spheres", "stop tolerance", "skin", "engine", "softer contacts", "truncation")
+AXES = (
+    "time step",
+    "spheres",
+    "stop tolerance",
+    "skin",
+    "engine",
+    "softer contacts",
+    "truncation",
+    "narrower bed",
+)
 """Properties in which variants differ, in the order of colours."""
 AS_PUBLISHED = "as published"
 INTERIOR, COUNT = "interior slab", "count"
@@ -73,7 +82,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, noise: float) -> None:
         for engine, of in here.groupby("engine"):
             other = label_of(str(engine))
             label = axis if engine == own else f"{other}, default" if axis == "engine" else f"{axis}, {other}"
-            marker = "o" if engine == own else "s"
+            marker = style.marker(index // len(style.PALETTE)) if engine == own else "s"
             axes.plot(of["seconds"], _shown(of["error"]), marker, color=style.colour(index), markersize=4, label=label)
     _default(axes, default, noise)
     for estimator, fill in ((COUNT, style.INK), (INTERIOR, "white")):
