@@ -49,7 +49,7 @@ SPHERES: Final = 8000
 """Number of spheres that the engines' times per sphere and step are for."""
 GROWTH: Final = 0.1
 """Exponent of the time per sphere in the number of spheres: less of a large bed is surface, and it needs more steps."""
-START_SECONDS: Final = 5.0
+START_SECONDS: Final = 1.5
 """Seconds of a job before and after its packings: Python, compiled kernels from their cache, records."""
 
 USUAL_POROSITY: Final = 0.35

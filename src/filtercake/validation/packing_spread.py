@@ -13,7 +13,10 @@ import pandas as pd
 from filtercake.crystals.csd import CrystalSizeDistribution
 from filtercake.packing.scene import FILTRATION_PROTOCOL, GRAVITY_PROTOCOL, Scene
 from filtercake.packing.spread import (
+    COUNT_POWER,
+    EVENNESS_POWER,
     FRICTION_COUNTS,
+    INTERIOR_POWER,
     REFERENCE_SPHERES,
     SD,
     effective_spheres,
@@ -37,11 +40,16 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class Fitted:
-    """Standard deviations by protocol and friction, as ``SD``; powers of count, evenness, interior; freedom."""
+    """Standard deviations by protocol and friction, as ``SD``; powers of count, evenness, interior; freedom.
+
+    ``gain`` is the logarithm of the likelihood over that of the constants in use, which follow the tables only where they
+    must: twice the gain beyond chance (chi-square, a degree of freedom per constant).
+    """
 
     sd: Mapping[tuple[str, bool], float]
     powers: tuple[float, float, float]
     freedom: float
+    gain: float
 
 
 def ensembles(data: Path) -> tuple[pd.DataFrame, list[Scene]]:
@@ -72,7 +80,9 @@ def fit(table: pd.DataFrame, scenes: list[Scene]) -> Fitted:
     found = optimize.minimize(_unlikelihood, start, args=(factors, logs, freedom), method="BFGS").x
     count, evenness, interior = 0.5 * found[4:7]
     sd = {kind: float(np.exp(0.5 * value)) for kind, value in zip(SD, found, strict=False)}
-    return Fitted(sd, (float(count), float(evenness), float(interior)), float(np.exp(found[7])))
+    in_use = 2.0 * np.array([*np.log(list(SD.values())), COUNT_POWER, EVENNESS_POWER, INTERIOR_POWER, 0.5 * found[7]])
+    gain = _unlikelihood(in_use, factors, logs, freedom) - _unlikelihood(found, factors, logs, freedom)
+    return Fitted(sd, (float(count), float(evenness), float(interior)), float(np.exp(found[7])), gain)
 
 
 def _factors(scene: Scene) -> list[float]:
