@@ -42,8 +42,8 @@ Table = dict[str, Any]
 class Fitted:
     """Standard deviations by protocol and friction, as ``SD``; powers of count, evenness, interior; freedom.
 
-    ``gain`` is the logarithm of the likelihood over that of the constants in use, which follow the tables only where they
-    must: twice the gain beyond chance (chi-square, a degree of freedom per constant).
+    ``gain`` is the logarithm of the likelihood over that of the constants in use. They follow the tables only where
+    they must: where twice the gain is beyond chance (chi-square, a degree of freedom per constant).
     """
 
     sd: Mapping[tuple[str, bool], float]
