@@ -244,6 +244,15 @@ def test_figures_draw_every_case() -> None:
     assert {"default", "as published, count", "analytic models", "LIGGGHTS, default"} <= set(labels)
 
 
+def test_a_single_packing_as_published_stands_in_the_figure_by_its_distance() -> None:
+    rows = error_rows()
+    rows.loc[rows["axis"] == "as published", ["error", "bias"]] = [np.nan, -0.0026]
+    with applied():
+        plot = run_time_error.draw(rows, references())
+    diamonds = [line for line in plot.axes[0].get_lines() if line.get_gid() == "published"]
+    assert [line.get_ydata().tolist() for line in diamonds] == [[0.0026], [0.0026]]
+
+
 def test_the_reliability_page_counts_a_sweep_once() -> None:
     good = {"lost": 0, "accepted": 0, "left": 0, "commands": 1, "equal": True}
     rows = [

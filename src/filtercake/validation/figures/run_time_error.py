@@ -61,7 +61,7 @@ def draw(table: pd.DataFrame, references: pd.DataFrame) -> Figure:
         figure,
         table.iloc[:0],
         "error: root mean square of the bias against the reference ensemble and the spread of one packing, of the "
-        "interior slab unless it says count",
+        "interior slab unless it says count; of a single packing its distance from the reference",
         "line: the default's mean of 1 to 32 packings",
         "shaded: standard error of the reference",
     )
@@ -90,7 +90,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, noise: float) -> None:
         published = rows[(rows["axis"] == AS_PUBLISHED) & (rows["estimator"] == estimator)]
         axes.plot(
             published["seconds"],
-            _shown(published["error"]),
+            _shown(published["error"].fillna(published["bias"].abs())),
             "D",
             markerfacecolor=fill,
             markeredgecolor=style.INK,
