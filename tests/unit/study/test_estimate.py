@@ -96,10 +96,8 @@ def test_steps_are_those_of_the_agreement_table() -> None:
         same = (table["csd"] == point.csd) & (table["friction"] == point.scene.friction)
         steps = table[same & (table["cohesion_kJ_m3"] == row["cohesion_kJ_m3"])]["steps"]
         if len(steps):
-            fraction = 0.36 if point.scene.friction == 0.0 else 0.2
-            assert 1.0 / ACCURACY < fall_steps(point.scene.with_time_step(fraction)) / steps.mean() < ACCURACY, (
-                point.name
-            )
+            scene = point.scene.with_time_step(limits.default_time_step(point.scene.friction))
+            assert 1.0 / ACCURACY < fall_steps(scene) / steps.mean() < ACCURACY, point.name
             compared += 1
     assert compared >= 7
 

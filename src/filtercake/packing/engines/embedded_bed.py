@@ -7,6 +7,7 @@ with its pairs and forces, when something that has left the parabola comes near 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -75,6 +76,8 @@ def _no_pairs(threads: int, capacity: int, frictional: bool) -> kernels.Pairs:
     )
 
 
+# a thread that waits for another soon sleeps: on a busy machine the other may then have its core
+os.environ.setdefault("GOMP_SPINCOUNT", "3000")
 # of the thread pools, the one with the least cost per parallel part of a time step comes first
 numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
 
