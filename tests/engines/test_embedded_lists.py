@@ -38,13 +38,11 @@ def touching(bed):
     high = 10.0 * (abs(place[:, 2]).max() + length)
     place[:, 2] += 0.5 * high
     tree = cKDTree(place, boxsize=[length, length, high])
-    found = set()
-    for i, j in tree.query_pairs(2.0 * bed.radius[:n].max()):
-        away = place[i] - place[j]
-        away[:2] -= length * np.round(away[:2] / length)
-        if away @ away < (bed.radius[i] + bed.radius[j]) ** 2:
-            found.add((i, j))
-    return found
+    i, j = tree.query_pairs(2.0 * bed.radius[:n].max(), output_type="ndarray").T
+    away = place[i] - place[j]
+    away[:, :2] -= length * np.round(away[:, :2] / length)
+    close = np.sum(away**2, axis=1) < (bed.radius[i] + bed.radius[j]) ** 2
+    return set(zip(i[close].tolist(), j[close].tolist(), strict=True))
 
 
 def near(bed):
