@@ -1,6 +1,9 @@
 """The embedded engine against closed forms and conservation laws; no LIGGGHTS needed."""
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -168,6 +171,16 @@ def test_periodic_images_are_equal(friction):
     apart[:, :2] -= LENGTH * np.round(apart[:, :2] / LENGTH)
     assert np.abs(apart).max() < 1e-9 * RADIUS * 1e3
     assert np.abs(moved.state()[1] - still.state()[1]).max() < 1e-8
+
+
+@pytest.mark.parametrize(("given", "kept"), [(None, "3000"), ("17", "17")])
+def test_threads_that_wait_soon_sleep(given, kept):
+    environment = {name: value for name, value in os.environ.items() if name != "GOMP_SPINCOUNT"}
+    if given is not None:
+        environment["GOMP_SPINCOUNT"] = given
+    code = "import os, filtercake.packing.engines.embedded_bed; print(os.environ['GOMP_SPINCOUNT'])"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == kept
 
 
 def test_two_threads_agree_with_one():
