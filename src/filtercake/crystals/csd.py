@@ -327,15 +327,17 @@ def read_table(path: str | Path) -> FullAndTruncated:
     Raises
     ------
     CsdError
-        As :func:`from_table`.
-    OSError, ValueError
-        If it cannot be read, or is no table.
+        As :func:`from_table`, or if it is no table; names the file.
+    OSError
+        If it cannot be read.
     """
     # a packing's job waits for no pandas
-    with Path(path).open(encoding="utf-8") as stream:
-        names = stream.readline().strip().split(",")
-        values = np.loadtxt(stream, delimiter=",", ndmin=2)
-    return from_table(dict(zip(names, values.T, strict=True)))
+    names, *rows = Path(path).read_text(encoding="utf-8").splitlines() or [""]
+    try:
+        values = np.array([[float(value) for value in row.split(",")] for row in rows], ndmin=2)
+        return from_table(dict(zip(names.split(","), values.T, strict=True)))
+    except (ValueError, CsdError) as error:
+        raise CsdError(f"{path}: not the table of a size distribution: {error}") from None
 
 
 def read_tables(paths: Iterable[str | Path]) -> dict[str, FullAndTruncated]:

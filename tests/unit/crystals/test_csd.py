@@ -302,6 +302,23 @@ def test_table_lists_left_out_classes_with_zero() -> None:
     assert table["x_over_d2_1_m2"].sum() == pytest.approx(full.sum_x_over_d2, rel=1e-14)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "size_um,volume_fraction\n",
+        "size_um\n20,0.5\n",
+        "size_um,volume_fraction\n20\n30,1\n",
+        "size_um\nx\n",
+        "size_um\n20\n",
+    ],
+)
+def test_a_damaged_table_is_refused_by_its_name(tmp_path: Path, text: str) -> None:
+    (tmp_path / "csd.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(CsdError, match=r"csd\.csv: not the table of a size distribution"):
+        read_table(tmp_path / "csd.csv")
+
+
 def test_the_same_table_on_disk_is_the_same_distribution(tmp_path: Path, alum) -> None:
     # the packing reads what the csd rule wrote: the cloud's seed hashes 13 digits of it
     full, cut = alum(15)
