@@ -30,7 +30,9 @@ def test_a_failing_job_names_point_reason_log_and_command(embedded):
     output = done.stdout + done.stderr
     assert done.returncode != 0
     assert "failed: packing bimodal_s50_mu0" in output
-    assert "reason: the table of a size distribution lacks the columns size_um" in output
+    assert (
+        "reason: results/resumed/csd/bimodal.csv: the table of a size distribution lacks the columns size_um" in output
+    )
     assert "Traceback" not in output
     assert "log:    results/resumed/logs/packing/bimodal_s50_mu0" in output
     assert "failed: packing from_file" not in output

@@ -332,12 +332,14 @@ def read_table(path: str | Path) -> FullAndTruncated:
         If it cannot be read.
     """
     # a packing's job waits for no pandas
-    names, *rows = Path(path).read_text(encoding="utf-8").splitlines() or [""]
+    header, *lines = Path(path).read_text(encoding="utf-8").splitlines() or [""]
+    names = header.split(",")
     try:
-        values = np.array([[float(value) for value in row.split(",")] for row in rows], ndmin=2)
-        return from_table(dict(zip(names.split(","), values.T, strict=True)))
+        rows = [[float(value) for value in line.split(",")] for line in lines]
+        values = list(zip(*rows, strict=True)) or [()] * len(names)
+        return from_table(dict(zip(names, values, strict=True)))
     except (ValueError, CsdError) as error:
-        raise CsdError(f"{path}: not the table of a size distribution: {error}") from None
+        raise CsdError(f"{path}: {error}") from None
 
 
 def read_tables(paths: Iterable[str | Path]) -> dict[str, FullAndTruncated]:
