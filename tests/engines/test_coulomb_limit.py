@@ -49,7 +49,7 @@ def pair_forces(velocity, spin, steps, *, capped):
     bed = bed_of(position, [velocity, np.zeros(3)], RADIUS, capped=capped, spin=[spin / RADIUS[0], np.zeros(3)])
     bed.advance(steps)
     found, _ = bed.state()
-    force = bed.force[0][np.argsort(bed.identity)][0]
+    force = bed.force[0][np.argsort(bed.identity)][0, :3]
     normal = (found[0] - found[1]) / np.linalg.norm(found[0] - found[1])
     push = float(force @ normal)
     return push, float(np.linalg.norm(force - push * normal))

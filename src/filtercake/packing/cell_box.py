@@ -17,6 +17,7 @@ from filtercake.packing.cell import CellScene, Look
 from filtercake.packing.cloud import size_levels
 from filtercake.packing.engines import embedded_kernels as kernels
 from filtercake.packing.engines import pair_kernels
+from filtercake.packing.engines.vector_kernels import FORCE, VECTOR, aligned
 from filtercake.units import MICROMETRE, FloatArray, IntArray
 
 SKIN_DIAMETERS: Final = (0.06, 1.0)
@@ -300,9 +301,11 @@ class CellBox:
     ) -> None:
         """Make what the time loop works on, with springs that are there already."""
         rows = np.concatenate([np.arange(self.identity.size), owner])
-        layers = (1, rows.size, 3)
+        state = aligned(rows.size * VECTOR).reshape(-1, VECTOR)
+        state[...] = self.spheres[rows]
+        force, torque = aligned(2 * rows.size * FORCE).reshape(2, 1, -1, FORCE)
         self.motion = cell_kernels.Motion(self.velocity, self.drag, owner, shift, self.box)
-        self.bodies = kernels.Bodies(self.spheres[rows], self.spin[rows], np.zeros(layers), np.zeros(layers))
+        self.bodies = kernels.Bodies(state, self.spin[rows], force, torque)
         self.pairs = _pairs(first, last, neighbour, self.frictional)
         if spring is not None:
             self.pairs.spring[...] = spring

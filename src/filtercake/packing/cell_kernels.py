@@ -304,7 +304,7 @@ def make_measure(attraction: int, frictional: bool) -> Callable[..., Averages]:
         place_images(bodies, motion, frictional)
         _clear(bodies, frictional)
         state, force, n = bodies.state, bodies.force[0], motion.velocity.shape[0]
-        alone = kernels.Bodies(np.empty((2, 8)), np.zeros((2, 3)), np.zeros((1, 2, 3)), np.zeros((1, 2, 3)))
+        alone = kernels.Bodies(np.empty((2, 8)), np.zeros((2, 3)), np.zeros((1, 2, 4)), np.zeros((1, 2, 4)))
         stress, contacts, total, overlap = np.zeros((3, 3)), 0, 0.0, 0.0
         for i in range(n):
             for p in range(pairs.first[i], pairs.last[i]):

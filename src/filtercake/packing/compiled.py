@@ -127,8 +127,13 @@ class _Files(FunctionCache):
 
     @cached_property
     def _borrowed(self) -> tuple[str, ...]:
-        """Digests of the modules with kernels that the function's own module names."""
-        named = self._py_func.__globals__.values()
-        modules = {value for value in named if isinstance(value, ModuleType) and value.__name__.endswith("_kernels")}
-        files = sorted(str(module.__file__) for module in modules)
+        """Digests of the modules with kernels that the function's own module names, and of those that they name."""
+        found: dict[str, ModuleType] = {}
+        waiting = [self._py_func.__globals__]
+        while waiting:
+            for value in waiting.pop().values():
+                if isinstance(value, ModuleType) and value.__name__.endswith("_kernels") and value.__name__ not in found:
+                    found[value.__name__] = value
+                    waiting.append(vars(value))
+        files = sorted(str(module.__file__) for module in found.values())
         return tuple(hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files)

@@ -108,3 +108,17 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(script: Pa
     borrowed.write_text(kernel.format(3.0))
     assert run(script)[:2] == ("63.0", False)
     assert run(script)[:2] == ("63.0", True)
+
+
+def test_a_kernel_is_compiled_anew_when_one_two_calls_away_has_changed(script: Path) -> None:
+    far, near = script.with_name("far_kernels.py"), script.with_name("near_kernels.py")
+    kernel = "from filtercake.packing.compiled import cached_njit\n{}\n@cached_njit\ndef times(x):\n    return {} * x\n"
+    far.write_text(kernel.format("", 2.0))
+    near.write_text(kernel.format("import far_kernels as far\n", "far.times(1.0)"))
+    script.write_text(
+        KERNEL.replace("2.0 * x", "near.times(x)").replace("\n\n@", "\nimport near_kernels as near\n\n@", 1)
+    )
+    assert run(script)[:2] == ("42.0", False)
+    assert run(script)[:2] == ("42.0", True)
+    far.write_text(kernel.format("", 3.0))
+    assert run(script)[:2] == ("63.0", False)

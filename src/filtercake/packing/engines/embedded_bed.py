@@ -19,6 +19,7 @@ from filtercake.packing import contact_law
 from filtercake.packing.cloud import Cloud, size_levels
 from filtercake.packing.engines import embedded_kernels as kernels
 from filtercake.packing.engines import pair_kernels
+from filtercake.packing.engines.vector_kernels import FORCE, VECTOR, aligned
 from filtercake.packing.scene import Scene
 from filtercake.units import GRAVITY, FloatArray, IntArray
 
@@ -71,7 +72,7 @@ def _no_pairs(threads: int, capacity: int, frictional: bool) -> kernels.Pairs:
         near_end=np.zeros(threads, dtype=np.uint64),
         near_owner=np.empty(capacity, dtype=np.uint32),
         near_neighbour=np.empty(capacity, dtype=np.uint32),
-        near_constants=np.empty((2, capacity + pair_kernels.VECTOR)),
+        near_constants=np.empty((2, capacity + VECTOR)),
         near_pair=np.empty(capacity, dtype=np.uint32),
     )
 
@@ -110,7 +111,9 @@ class Bed:
         self.gravity, self.threads = gravity, threads
         self.scene, self.length, self.total = scene, length, n
         self.frictional = scene.friction > 0.0
-        self.spheres = np.column_stack([position, radius, velocity, scene.density * 4.0 / 3.0 * np.pi * radius**3])
+        self.spheres = aligned(n * VECTOR).reshape(n, VECTOR)
+        mass = scene.density * 4.0 / 3.0 * np.pi * radius**3
+        self.spheres[...] = np.column_stack([position, radius, velocity, mass])
         self.position, self.velocity = self.spheres[:, :3], self.spheres[:, 4:7]
         self.radius, self.mass = self.spheres[:, 3], self.spheres[:, 7]
         self.spin = np.zeros((n, 3))
@@ -126,8 +129,8 @@ class Bed:
         self.ceiling = CEILING_BOXES * max(length, float(position[:, 2].max(initial=0.0)))
         self._set_material()
         layers = threads + 1 if threads > 1 else 1  # memory that is never written to is never taken
-        self.force = np.zeros((layers, n, 3))
-        self.torque = np.zeros((layers, n if self.frictional else 1, 3))
+        self.force = aligned(layers * n * FORCE).reshape(layers, n, FORCE)
+        self.torque = np.zeros((layers, n if self.frictional else 1, FORCE))
         self.reference, self.course, self.room = np.zeros((n, 3)), np.zeros(n), np.zeros(n)
         self.watched = np.empty(0, dtype=np.int64)
         self.grounded = np.empty(0, dtype=np.int64)
@@ -421,7 +424,7 @@ class Bed:
         n = self.count
         position, velocity = self.position.copy(), self.velocity.copy()
         half = 0.0 if self.starting else 0.5 * self.scene.time_step
-        velocity[:n] += half * self.force[0, :n] / self.mass[:n, None]
+        velocity[:n] += half * self.force[0, :n, :3] / self.mass[:n, None]
         position[n:, 2] -= self.fallen(self.step)
         velocity[n:, 2] = -self.falling_speed(self.step)
         return position, velocity
@@ -438,7 +441,7 @@ class Bed:
         spin = self.spin.copy()
         if self.frictional and not self.starting:
             inertia = 0.4 * self.mass * self.radius**2
-            spin[: self.count] += (0.5 * self.scene.time_step * self.torque[0] / inertia[:, None])[: self.count]
+            spin[: self.count] += (0.5 * self.scene.time_step * self.torque[0, :, :3] / inertia[:, None])[: self.count]
         return spin[np.argsort(self.identity)]
 
     def record(self) -> tuple[float, float, float, float]:

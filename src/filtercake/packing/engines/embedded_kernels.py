@@ -134,8 +134,9 @@ class Bodies(NamedTuple):
         Position, radius, velocity and mass: one sphere is one cache line.
     spin : ndarray, shape (n, 3)
         Angular velocity, rad/s.
-    force, torque : ndarray, shape (layers, n, 3)
-        The first is the total. With several threads each has one more, for what acts on the others' spheres.
+    force, torque : ndarray, shape (layers, n, 4)
+        The fourth column is nought. The first layer is the total; with several threads each has one more, for what
+        acts on the others' spheres.
     """
 
     state: FloatArray

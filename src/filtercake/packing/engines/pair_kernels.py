@@ -14,6 +14,7 @@ import numpy as np
 from numba.misc.special import literally
 
 from filtercake.packing.compiled import cached_njit
+from filtercake.packing.engines import vector_kernels
 from filtercake.units import FloatArray
 
 if TYPE_CHECKING:
@@ -31,8 +32,8 @@ NO_ATTRACTION, COHESION, ADHESION = range(3)
 X, Y, Z, RADIUS, U, V, W, MASS = range(8)
 
 # indices are unsigned: signed ones cost a test for negative values at every access
-IMAGE_SHIFT: Final = np.uint32(28)
-INDEX_MASK: Final = np.uint32(2**28 - 1)
+IMAGE_SHIFT: Final = np.uint32(vector_kernels.IMAGE_SHIFT)
+INDEX_MASK: Final = np.uint32(vector_kernels.INDEX_MASK)
 SAME_IMAGE: Final = np.uint32(4)
 """Code of a neighbour in the box itself, not in one of its eight periodic images."""
 IMAGES: Final = 9
@@ -40,59 +41,36 @@ IMAGES: Final = 9
 # rows of a pair's near constants
 STIFFNESS, DAMPING = range(2)
 
-VECTOR: Final = 8
-"""Numbers that the widest vector unit takes at once: rows are worked on up to a multiple of it."""
-CHUNK: Final = 64
-_ROWS: Final = 36
+VECTOR: Final = vector_kernels.VECTOR
+CHUNK: Final = vector_kernels.CHUNK
+_ROWS: Final = 35
 
 # where each row begins. A loop writes no row that it reads: that would keep it from the vector units
-(_DX, _DY, _DZ, _TOTAL, _UNLIKE) = (np.uint64(CHUNK * row) for row in range(5))
-(_DU, _DV, _DW, _OPENING, _PUSH) = (np.uint64(CHUNK * row) for row in range(5, 10))
-(_TURN_X, _TURN_Y, _TURN_Z, _SPIN_X, _SPIN_Y, _SPIN_Z) = (np.uint64(CHUNK * row) for row in range(10, 16))
-(_OLD_X, _OLD_Y, _OLD_Z, _NEW_X, _NEW_Y, _NEW_Z) = (np.uint64(CHUNK * row) for row in range(16, 22))
-(_INVERSE, _NORMAL, _SPRING, _DAMPER, _ARM, _OTHER_ARM) = (np.uint64(CHUNK * row) for row in range(22, 28))
-(_FX, _FY, _FZ, _MX, _MY, _MZ) = (np.uint64(CHUNK * row) for row in range(28, 34))
-_SPEED, _TOUCHING = np.uint64(CHUNK * 34), np.uint64(CHUNK * 35)
+(_DX, _DY, _DZ, _UNLIKE, _DU, _DV, _DW, _TOTAL) = (np.uint64(CHUNK * row) for row in range(8))
+(_TURN_X, _TURN_Y, _TURN_Z, _SPIN_X, _SPIN_Y, _SPIN_Z) = (np.uint64(CHUNK * row) for row in range(8, 14))
+(_OLD_X, _OLD_Y, _OLD_Z, _NEW_X, _NEW_Y, _NEW_Z) = (np.uint64(CHUNK * row) for row in range(14, 20))
+(_INVERSE, _NORMAL, _SPRING, _DAMPER, _ARM, _OTHER_ARM) = (np.uint64(CHUNK * row) for row in range(20, 26))
+(_FX, _FY, _FZ, _MX, _MY, _MZ) = (np.uint64(CHUNK * row) for row in range(26, 32))
+_SPEED, _TOUCHING, _PUSH = (np.uint64(CHUNK * row) for row in range(32, 35))
 
 
 @cached_njit
 def _image_shifts(length: float) -> FloatArray:
-    """How far each code's image lies along x and y, m, shape (9, 2)."""
-    shift = np.empty((IMAGES, 2))
+    """How far each code's image lies along x and y, m, in rows of eight: shape (9, 8)."""
+    shift = np.zeros((IMAGES, VECTOR))
     for code in range(IMAGES):
         shift[code, 0], shift[code, 1] = (code % 3 - 1) * length, (code // 3 - 1) * length
     return shift
 
 
 @_compiled
-def _gather(begin: int, end: int, state: FloatArray, pairs: Pairs, shift: FloatArray, rows: FloatArray) -> None:
-    """Fill in, for near pairs ``begin`` to ``end``, the way to a sphere, how fast it opens, and both radii."""
-    owner, neighbour = pairs.near_owner, pairs.near_neighbour
-    c = np.uint64(0)
-    for p in range(begin, end):
-        i, j, code = owner[p], neighbour[p] & INDEX_MASK, neighbour[p] >> IMAGE_SHIFT
-        dx = state[i, X] - state[j, X] - shift[code, 0]
-        dy = state[i, Y] - state[j, Y] - shift[code, 1]
-        dz = state[i, Z] - state[j, Z]
-        du, dv, dw = state[i, U] - state[j, U], state[i, V] - state[j, V], state[i, W] - state[j, W]
-        ri, rj = state[i, RADIUS], state[j, RADIUS]
-        rows[_DX + c], rows[_DY + c], rows[_DZ + c] = dx, dy, dz
-        rows[_OPENING + c] = du * dx + dv * dy + dw * dz
-        rows[_TOTAL + c], rows[_UNLIKE + c] = ri + rj, ri - rj
-        c += np.uint64(1)
-
-
-@_compiled
 def _gather_turning(begin: int, end: int, bodies: Bodies, pairs: Pairs, rows: FloatArray) -> None:
-    """Fill in what friction needs beside that: relative velocity, spins and the tangential springs."""
+    """Fill in what friction needs beside the differences of the states: spins and the tangential springs."""
     state, spin, spring = bodies.state, bodies.spin, pairs.spring
     c = np.uint64(0)
     for p in range(begin, end):
         i, j, pair = pairs.near_owner[p], pairs.near_neighbour[p] & INDEX_MASK, pairs.near_pair[p]
         ri, rj = state[i, RADIUS], state[j, RADIUS]
-        rows[_DU + c] = state[i, U] - state[j, U]
-        rows[_DV + c] = state[i, V] - state[j, V]
-        rows[_DW + c] = state[i, W] - state[j, W]
         rows[_TURN_X + c], rows[_SPIN_X + c] = ri * spin[i, 0] + rj * spin[j, 0], spin[i, 0] + spin[j, 0]
         rows[_TURN_Y + c], rows[_SPIN_Y + c] = ri * spin[i, 1] + rj * spin[j, 1], spin[i, 1] + spin[j, 1]
         rows[_TURN_Z + c], rows[_SPIN_Z + c] = ri * spin[i, 2] + rj * spin[j, 2], spin[i, 2] + spin[j, 2]
@@ -119,7 +97,7 @@ def _normal(
         overlap = max(total - r, 0.0)
         root = math.sqrt(overlap)
         damper = damping[begin + c] * math.sqrt(root)
-        speed = rows[_OPENING + c] * inverse
+        speed = (rows[_DU + c] * dx + rows[_DV + c] * dy + rows[_DW + c] * dz) * inverse
         normal = stiffness[begin + c] * (overlap * root) - damper * speed
         push = normal
         if attraction == COHESION:
@@ -174,27 +152,19 @@ def _tangential(count: int, law: Law, spring_step: float, rows: FloatArray) -> N
 
 
 @_compiled
-def _give_push(part: int, begin: int, end: int, bodies: Bodies, pairs: Pairs, rows: FloatArray) -> None:
+def _give_push(
+    part: int, begin: int, end: int, force: FloatArray, pairs: Pairs, apart: FloatArray, rows: FloatArray
+) -> None:
     """Add the forces to both spheres: to the total, or, of another part's sphere, to the layer of this part."""
-    force, layer = bodies.force[0], bodies.force[min(part + 1, bodies.force.shape[0] - 1)]
-    alone = bodies.force.shape[0] == 1  # then the images of a cell are its own, too
-    lower, upper = np.uint64(pairs.bounds[part]), np.uint64(pairs.bounds[part + 1])
+    owner, neighbour, bounds = pairs.near_owner, pairs.near_neighbour, pairs.bounds
+    lower, upper = np.uint64(bounds[part]), np.uint64(bounds[part + 1])
+    # alone, the images of a cell are its own, too
+    layer = np.uint64(part + 1) * np.uint64(force.shape[1]) if force.shape[0] > 1 else np.uint64(0)
     c = np.uint64(0)
     for p in range(begin, end):
-        i, j = pairs.near_owner[p], pairs.near_neighbour[p] & INDEX_MASK
-        push = rows[_PUSH + c]
-        gx, gy, gz = push * rows[_DX + c], push * rows[_DY + c], push * rows[_DZ + c]
-        force[i, 0] += gx
-        force[i, 1] += gy
-        force[i, 2] += gz
-        if alone or lower <= j < upper:
-            force[j, 0] -= gx
-            force[j, 1] -= gy
-            force[j, 2] -= gz
-        else:
-            layer[j, 0] -= gx
-            layer[j, 1] -= gy
-            layer[j, 2] -= gz
+        j = np.uint64(neighbour[p] & INDEX_MASK)
+        j += np.uint64(0) if lower <= j < upper else layer
+        vector_kernels.give_and_take(force, owner[p], j, rows[_PUSH + c], apart, c)
         c += np.uint64(1)
 
 
@@ -249,12 +219,14 @@ def pair_forces(
     begin, end = pairs.bounds[part], pairs.bounds[part + 1]
     if begin == end:
         return
-    rows, shift = np.zeros(_ROWS * CHUNK), _image_shifts(law.length)
+    rows, apart = vector_kernels.aligned(_ROWS * CHUNK), vector_kernels.aligned(VECTOR * CHUNK)
+    state, owner, neighbour, shift = bodies.state, pairs.near_owner, pairs.near_neighbour, _image_shifts(law.length)
     here, last = pairs.first[begin], pairs.near_end[part]
     while here < last:
         stop = min(here + np.uint64(CHUNK), last)
         count = (stop - here + np.uint64(VECTOR - 1)) // np.uint64(VECTOR) * np.uint64(VECTOR)
-        _gather(here, stop, bodies.state, pairs, shift, rows)
+        for c in range(np.uint64(0), count, np.uint64(VECTOR)):
+            vector_kernels.gather_pairs(state, owner, neighbour, shift, here + c, stop, apart, rows, c)
         if frictional:
             _gather_turning(here, stop, bodies, pairs, rows)
         _normal(here, count, pairs.near_constants, law, attraction, frictional, rows)
@@ -262,5 +234,5 @@ def pair_forces(
             _tangential(count, law, spring_step, rows)
             _give_turning(part, here, stop, bodies, pairs, rows)
         else:
-            _give_push(part, here, stop, bodies, pairs, rows)
+            _give_push(part, here, stop, bodies.force, pairs, apart, rows)
         here = stop
