@@ -229,12 +229,12 @@ class CellBox:
         place = np.empty_like(index)
         place[index] = np.arange(index.size)
         half = 0.5 * self.skin
+        course, fast = np.zeros(index.size), np.zeros(index.size, dtype=np.bool_)  # in the box none has its own
         grid = kernels.Grid(
             length=length,
             level=level,
-            # in the box none has a course of its own
-            spheres=np.column_stack([rows[index, :4], np.full(index.size, half), np.zeros(index.size)]),
-            fast=np.zeros(index.size, dtype=np.bool_),
+            columns=kernels.in_cells(index, rows, course, rows[:, pair_kernels.RADIUS] + half, fast),
+            fast=fast,
             member=index,
             place=place,
             start=start,

@@ -132,7 +132,11 @@ class _Files(FunctionCache):
         waiting = [self._py_func.__globals__]
         while waiting:
             for value in waiting.pop().values():
-                if isinstance(value, ModuleType) and value.__name__.endswith("_kernels") and value.__name__ not in found:
+                if (
+                    isinstance(value, ModuleType)
+                    and value.__name__.endswith("_kernels")
+                    and value.__name__ not in found
+                ):
                     found[value.__name__] = value
                     waiting.append(vars(value))
         files = sorted(str(module.__file__) for module in found.values())

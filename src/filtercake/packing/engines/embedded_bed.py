@@ -380,7 +380,7 @@ class Bed:
         return kernels.Grid(
             length=self.length,
             level=level,
-            spheres=np.column_stack([spheres[index, :4], self.room[index], self.course[index]]),
+            columns=kernels.in_cells(index, spheres, self.course[:n], self.radius[:n] + self.room[:n], fast),
             fast=fast[index],
             member=index,
             place=place,

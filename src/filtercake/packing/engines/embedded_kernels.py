@@ -16,7 +16,7 @@ from numba import prange
 from numba.misc.special import literally
 
 from filtercake.packing.compiled import cached_njit
-from filtercake.packing.engines import pair_kernels
+from filtercake.packing.engines import pair_kernels, vector_kernels
 from filtercake.packing.engines.pair_kernels import (
     COHESION,
     DAMPING,
@@ -34,6 +34,7 @@ from filtercake.packing.engines.pair_kernels import (
     Y,
     Z,
 )
+from filtercake.packing.engines.vector_kernels import VECTOR
 from filtercake.units import FloatArray, IntArray
 
 Unsigned = np.ndarray[Any, np.dtype[np.uint64]]
@@ -49,8 +50,9 @@ class Grid(NamedTuple):
         Side of the periodic box, m.
     level : ndarray, shape (n,)
         Size level of each sphere of the bed, 0 the coarsest.
-    spheres : ndarray, shape (n, 6)
-        Position, radius, room and course (:class:`Listing`), sorted by level and cell.
+    columns : ndarray, shape (6, n + 8)
+        Position, course (:class:`Listing`), and radius and room together, twice: of all spheres and, no number of the
+        fast ones, of the others. Sorted by level and cell; a whole vector may be read at the last.
     fast : ndarray, shape (n,)
         Which of these are searched for from nowhere: they search for all others themselves.
     member : ndarray, shape (n,)
@@ -71,7 +73,7 @@ class Grid(NamedTuple):
 
     length: float
     level: IntArray
-    spheres: FloatArray
+    columns: FloatArray
     fast: np.ndarray[Any, np.dtype[np.bool_]]
     member: IntArray
     place: IntArray
@@ -235,8 +237,8 @@ class Law(NamedTuple):
     capped: bool = False
 
 
-ROOM, COURSE = 4, 5
-"""Columns of the grid's spheres, behind the radius."""
+COURSE, REACH, SLOW_REACH = np.uint64(3), np.uint64(4), np.uint64(5)
+"""Columns of the grid, behind the positions."""
 
 NEAR_STEPS = 20
 """Time steps that the choice of near pairs lasts, unless a sphere becomes too fast for it."""
@@ -319,13 +321,27 @@ def sort_into_cells(
     return _by_cell(cell, start), start, shape, offset
 
 
+def in_cells(
+    index: IntArray, state: FloatArray, course: FloatArray, reach: FloatArray, fast: np.ndarray[Any, np.dtype[np.bool_]]
+) -> FloatArray:
+    """Make the columns of a :class:`Grid`, in the order ``index`` of its cells.
+
+    ``reach`` (n,), m, is how far from where its course leads a sphere may touch something.
+    """
+    columns = np.zeros((6, index.size + VECTOR))
+    found = (state[:, X], state[:, Y], state[:, Z], course, reach, np.where(fast, np.nan, reach))
+    for column, of in zip(columns, found, strict=True):
+        column[: index.size] = of[index]
+    return columns
+
+
 @_compiled
 def _find_pairs(part: int, state: FloatArray, grid: Grid, pairs: Pairs) -> int:
     """List the pairs of one part's spheres in its share of the list; return how many they are."""
     bounds, first, last, neighbour = pairs.bounds, pairs.first, pairs.last, pairs.neighbour
-    level, spheres, fast, member, place, start = (
+    level, columns, fast, member, place, start = (
         grid.level,
-        grid.spheres,
+        grid.columns,
         grid.fast,
         grid.member,
         grid.place,
@@ -334,16 +350,17 @@ def _find_pairs(part: int, state: FloatArray, grid: Grid, pairs: Pairs) -> int:
     length, shape, offset, largest, cell_size = grid.length, grid.shape, grid.offset, grid.largest, grid.cell_size
     parts = bounds.size - 1
     room = neighbour.size // parts
-    begin_at, last_slot = part * room, room - 1
+    begin_at, last_slot, horizon = part * room, room - 1, float(grid.horizon)
     count = 0
     for i in range(bounds[part], bounds[part + 1]):
         first[i] = begin_at + count
-        x, y, z, r = state[i, X], state[i, Y], state[i, Z], state[i, RADIUS]
+        x, y, z = state[i, X], state[i, Y], state[i, Z]
         own, here = level[i], place[i]
-        is_fast, own_room, course = fast[here], spheres[here, ROOM], spheres[here, COURSE]
-        stride = own_room + grid.horizon * abs(course)
+        is_fast, own_reach, course = fast[here], columns[REACH, here], columns[COURSE, here]
+        wanted = REACH if is_fast else SLOW_REACH
+        stride = own_reach + horizon * abs(course)
         for k in range(shape.shape[0] if is_fast else own + 1):
-            reach = r + largest[k] + stride + grid.stride[1 if is_fast else 0, k]
+            reach = stride + largest[k] + grid.stride[1 if is_fast else 0, k]
             across, layers = shape[k, 0], shape[k, 2]
             inverse = across / length
             # one periodic image to either side: the next is a sphere's own width away and never touches
@@ -367,14 +384,15 @@ def _find_pairs(part: int, state: FloatArray, grid: Grid, pairs: Pairs) -> int:
                         if k == own and not is_fast:
                             begin = max(begin, here + 1)  # each pair once
                         code = np.uint32((wrap_y + 1) * 3 + wrap_x + 1) << IMAGE_SHIFT
-                        for j in range(np.uint64(begin), np.uint64(end)):
-                            dx, dy, dz = xs - spheres[j, X], ys - spheres[j, Y], z - spheres[j, Z]
-                            near = r + spheres[j, RADIUS] + own_room + spheres[j, ROOM]
-                            near += grid.horizon * abs(course - spheres[j, COURSE])
-                            mine = not fast[j] or (is_fast and j > here)
-                            # written in any case and kept if near: a branch here is too often guessed wrongly
-                            neighbour[begin_at + min(count, last_slot)] = np.uint32(member[j]) | code
-                            count += (dx * dx + dy * dy + dz * dz < near * near) & mine & (j != here)
+                        for j in range(np.uint64(begin), np.uint64(end), np.uint64(VECTOR)):
+                            found = vector_kernels.lanes_in_reach(
+                                columns, wanted, j, end, xs, ys, z, own_reach, course, horizon
+                            )
+                            while found:
+                                other = j + vector_kernels.lowest_bit(found)
+                                found &= found - np.uint64(1)
+                                neighbour[begin_at + min(count, last_slot)] = np.uint32(member[other]) | code
+                                count += not (is_fast and fast[other] and other <= here)
         last[i] = begin_at + count
     return count
 

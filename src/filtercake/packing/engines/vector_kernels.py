@@ -41,6 +41,12 @@ def aligned(size: int) -> FloatArray:
     return room[(-room.ctypes.data % (_BYTES * VECTOR)) // _BYTES :][:size]
 
 
+def _splat(builder: Any, number: Any) -> Any:
+    """Take a number in every lane."""
+    vector = ir.Constant(ir.VectorType(_NUMBER, VECTOR), ir.Undefined)
+    return builder.shuffle_vector(builder.insert_element(vector, number, _LANE(0)), vector, _lanes([0] * VECTOR))
+
+
 def _intrinsic(function: Callable[..., Any]) -> Callable[..., Any]:
     """Make a function of the kinds of its arguments an intrinsic, which compiled code calls with those arguments."""
     made: Callable[..., Any] = intrinsic(function)
@@ -161,3 +167,65 @@ def give_and_take(typing: Any, force: Any, i: Any, j: Any, push: Any, apart: Any
         return context.get_dummy_value()
 
     return signature, generate
+
+
+@_intrinsic
+def lanes_in_reach(
+    typing: Any,
+    columns: Any,
+    row: Any,
+    begin: Any,
+    end: Any,
+    x: Any,
+    y: Any,
+    z: Any,
+    reach: Any,
+    course: Any,
+    horizon: Any,
+) -> Any:
+    """Find which of eight spheres may come within reach of a point: a bit for each, none beyond ``end``.
+
+    ``columns`` (6, n + 8) are the centres, the courses and, in the ``row`` to be used, the reaches of the spheres; a
+    reach that is no number never reaches. Both move by their course, along z, for up to ``horizon`` steps.
+    """
+    if not _rows(columns):
+        return None
+    number, index = types.float64, types.uint64
+    signature = index(columns, index, index, index, number, number, number, number, number, number)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        columns, row, begin, end, *point = arguments
+        x, y, z, reach, course, horizon = (_splat(builder, number) for number in point)
+        array = context.make_array(signature.args[0])(context, builder, columns)
+        length = builder.extract_value(array.shape, 1)
+
+        def spheres(row: Any) -> Any:
+            at = builder.add(builder.mul(row, length), begin)
+            return _load(builder, builder.gep(array.data, [at]), VECTOR)
+
+        kind, whole = ir.VectorType(_NUMBER, VECTOR), ir.VectorType(_INDEX, VECTOR)
+        unsigned = ir.Constant(whole, [_INDEX(2**63 - 1)] * VECTOR)
+        apart = [builder.fsub(of, spheres(_INDEX(k))) for k, of in enumerate((x, y, z))]
+        drift = builder.bitcast(builder.fsub(course, spheres(_INDEX(3))), whole)
+        drift = builder.bitcast(builder.and_(drift, unsigned), kind)
+        touching = builder.fadd(builder.fadd(reach, spheres(row)), builder.fmul(horizon, drift))
+        square = ir.Constant(kind, [_NUMBER(0.0)] * VECTOR)
+        for way in apart:
+            square = builder.fadd(square, builder.fmul(way, way, flags=("contract",)), flags=("contract",))
+        near = builder.fcmp_ordered("<", square, builder.fmul(touching, touching))
+        bits = builder.zext(builder.bitcast(near, ir.IntType(VECTOR)), _INDEX)
+        left = builder.sub(end, begin)
+        left = builder.select(builder.icmp_unsigned("<", left, _INDEX(VECTOR)), left, _INDEX(VECTOR))
+        return builder.and_(bits, builder.sub(builder.shl(_INDEX(1), left), _INDEX(1)))
+
+    return signature, generate
+
+
+@_intrinsic
+def lowest_bit(typing: Any, bits: Any) -> Any:
+    """Place of the lowest bit that is set; there must be one."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.cttz(arguments[0], ir.IntType(1)(1))
+
+    return types.uint64(types.uint64), generate
