@@ -43,6 +43,8 @@ STIFFNESS, DAMPING = range(2)
 
 VECTOR: Final = vector_kernels.VECTOR
 CHUNK: Final = vector_kernels.CHUNK
+FAR: Final = 50_000
+"""Spheres from which a bed fits into no memory that is near: what comes next is asked for ahead."""
 _ROWS: Final = 35
 
 # where each row begins. A loop writes no row that it reads: that would keep it from the vector units
@@ -61,6 +63,16 @@ def _image_shifts(length: float) -> FloatArray:
     for code in range(IMAGES):
         shift[code, 0], shift[code, 1] = (code % 3 - 1) * length, (code // 3 - 1) * length
     return shift
+
+
+@_compiled
+def _fetch(begin: int, end: int, bodies: Bodies, pairs: Pairs) -> None:
+    """Ask for the neighbours of near pairs that are worked on next: of large beds they are in no near memory."""
+    state, force, neighbour = bodies.state, bodies.force, pairs.near_neighbour
+    for p in range(begin, end):
+        j = np.uint64(neighbour[p] & INDEX_MASK)
+        vector_kernels.fetch_row(state, j, np.uint64(VECTOR))
+        vector_kernels.fetch_row(force, j, np.uint64(vector_kernels.FORCE))
 
 
 @_compiled
@@ -222,9 +234,12 @@ def pair_forces(
     rows, apart = vector_kernels.aligned(_ROWS * CHUNK), vector_kernels.aligned(VECTOR * CHUNK)
     state, owner, neighbour, shift = bodies.state, pairs.near_owner, pairs.near_neighbour, _image_shifts(law.length)
     here, last = pairs.first[begin], pairs.near_end[part]
+    far = state.shape[0] >= FAR
     while here < last:
         stop = min(here + np.uint64(CHUNK), last)
         count = (stop - here + np.uint64(VECTOR - 1)) // np.uint64(VECTOR) * np.uint64(VECTOR)
+        if far:
+            _fetch(stop, min(stop + np.uint64(CHUNK), last), bodies, pairs)
         for c in range(np.uint64(0), count, np.uint64(VECTOR)):
             vector_kernels.gather_pairs(state, owner, neighbour, shift, here + c, stop, apart, rows, c)
         if frictional:

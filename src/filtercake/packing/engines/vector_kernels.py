@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from llvmlite import ir
 from numba.core import types
+from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic, register_jitable
 
 from filtercake.units import FloatArray
@@ -138,6 +139,24 @@ def gather_pairs(
         for k, vector in enumerate(_transposed(builder, found)):
             at = builder.add(c, _INDEX(k * CHUNK))
             _store(builder, vector, _place(context, builder, signature, arguments, 7, at))
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@_intrinsic
+def fetch_row(typing: Any, array: Any, row: Any, columns: Any) -> Any:
+    """Ask for a row of an array, which is to be there when it is wanted later: nothing waits for it."""
+    if not _rows(array):
+        return None
+    signature = types.void(array, types.uint64, types.uint64)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _place(context, builder, signature, arguments, 0, builder.mul(arguments[1], arguments[2]))
+        byte = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [byte, _LANE, _LANE, _LANE])
+        prefetch = get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        builder.call(prefetch, [builder.bitcast(place, byte), _LANE(0), _LANE(3), _LANE(1)])  # read, keep, data
         return context.get_dummy_value()
 
     return signature, generate
