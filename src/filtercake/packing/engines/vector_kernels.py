@@ -32,6 +32,7 @@ INDEX_MASK: Final = 2**IMAGE_SHIFT - 1
 """Of a neighbour, the lower bits are its index, the upper ones a code of its periodic image."""
 
 _NUMBER, _INDEX, _LANE = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+_NO_FORCE = ir.Constant(ir.VectorType(_NUMBER, FORCE), [_NUMBER(0.0)] * FORCE)
 _BYTES: Final = 8
 
 
@@ -46,6 +47,14 @@ def _splat(builder: Any, number: Any) -> Any:
     """Take a number in every lane."""
     vector = ir.Constant(ir.VectorType(_NUMBER, VECTOR), ir.Undefined)
     return builder.shuffle_vector(builder.insert_element(vector, number, _LANE(0)), vector, _lanes([0] * VECTOR))
+
+
+def _three(builder: Any, number: Any) -> Any:
+    """Take a number in the lanes of a force, and nought in the last."""
+    vector = _NO_FORCE
+    for lane in range(FORCE - 1):
+        vector = builder.insert_element(vector, number, _LANE(lane))
+    return vector
 
 
 def _intrinsic(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -155,7 +164,7 @@ def fetch_row(typing: Any, array: Any, row: Any, columns: Any) -> Any:
         place = _place(context, builder, signature, arguments, 0, builder.mul(arguments[1], arguments[2]))
         byte = ir.IntType(8).as_pointer()
         kind = ir.FunctionType(ir.VoidType(), [byte, _LANE, _LANE, _LANE])
-        prefetch = get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        prefetch = get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")  # type: ignore[no-untyped-call]
         builder.call(prefetch, [builder.bitcast(place, byte), _LANE(0), _LANE(3), _LANE(1)])  # read, keep, data
         return context.get_dummy_value()
 
@@ -176,10 +185,7 @@ def give_and_take(typing: Any, force: Any, i: Any, j: Any, push: Any, apart: Any
         def row(k: int, number: Any, columns: int) -> Any:
             return _place(context, builder, signature, arguments, k, builder.mul(number, _INDEX(columns)))
 
-        three = ir.Constant(ir.VectorType(_NUMBER, FORCE), [_NUMBER(0.0)] * FORCE)
-        for lane in range(FORCE - 1):
-            three = builder.insert_element(three, arguments[3], _LANE(lane))
-        given = builder.fmul(_load(builder, row(4, arguments[5], VECTOR), FORCE), three)
+        given = builder.fmul(_load(builder, row(4, arguments[5], VECTOR), FORCE), _three(builder, arguments[3]))
         for sphere, change in ((arguments[1], builder.fadd), (arguments[2], builder.fsub)):
             place = row(0, sphere, FORCE)
             _store(builder, change(_load(builder, place, FORCE), given), place)
