@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pandas as pd
 import pytest
 
 from filtercake.crystals.csd import mixture
+from filtercake.packing.engines.pair_kernels import FAR
 from filtercake.packing.scene import Scene
 from filtercake.study.estimate import fall_steps
 from filtercake.validation import large_beds
@@ -33,7 +35,9 @@ SCENE = large_beds_of(
 )
 
 
-def test_beds_are_laid_side_by_side_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
+# the second is so large that what comes next is fetched ahead
+@pytest.mark.parametrize("count", [2, math.ceil(math.sqrt(FAR / SCENE.particles))])
+def test_beds_are_laid_side_by_side_without_a_seam(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The forces on every tile are those on the bed that was laid out."""
     position, velocity, radius, length = large_beds._settled(SCENE)
     forces = []
@@ -47,11 +51,12 @@ def test_beds_are_laid_side_by_side_without_a_seam(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(large_beds, "Bed", Kept)
     large_beds._time(SCENE, position, velocity, radius, length, 1, 1)
-    shift = length * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)])
+    shift = length * np.array([(i, j, 0) for j in range(count) for i in range(count)], dtype=float)
     tiled = np.vstack([position + way for way in shift])
-    large_beds._time(SCENE, tiled, np.tile(velocity, (4, 1)), np.tile(radius, 4), 2 * length, 1, 1)
-    one, four = forces
-    assert four == pytest.approx(np.tile(one, (4, 1)), rel=1e-6, abs=1e-6 * np.abs(one).max())
+    tiles = count**2
+    large_beds._time(SCENE, tiled, np.tile(velocity, (tiles, 1)), np.tile(radius, tiles), count * length, 1, 1)
+    one, all_of_them = forces
+    assert all_of_them == pytest.approx(np.tile(one, (tiles, 1)), rel=1e-6, abs=1e-6 * np.abs(one).max())
 
 
 def test_every_bed_is_timed_on_one_and_two_threads() -> None:
