@@ -46,16 +46,20 @@ def touching(bed):
 
 
 def near(bed):
-    """Pairs that the time loop works on at present."""
-    pairs, found = bed.pairs, set()
+    """Pairs that the time loop works on at present, none of them twice."""
+    pairs, images = bed.pairs, []
     for part in range(bed.threads):
         begin = pairs.bounds[part]
         if begin == pairs.bounds[part + 1]:
             continue
         here = slice(int(pairs.first[begin]), int(pairs.near_end[part]))
-        other = pairs.near_neighbour[here] & pair_kernels.INDEX_MASK
-        found |= {(min(a, b), max(a, b)) for a, b in zip(pairs.near_owner[here].tolist(), other.tolist(), strict=True)}
-    return found
+        owner, named = pairs.near_owner[here].astype(int), pairs.near_neighbour[here].astype(int)
+        other, image = named & int(pair_kernels.INDEX_MASK), named >> int(pair_kernels.IMAGE_SHIFT)
+        # from the other sphere the image lies on the other side
+        image = np.where(owner < other, image, 2 * int(pair_kernels.SAME_IMAGE) - image)
+        images += zip(np.minimum(owner, other).tolist(), np.maximum(owner, other).tolist(), image.tolist(), strict=True)
+    assert len(set(images)) == len(images)
+    return {(i, j) for i, j, _ in images}
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
@@ -121,20 +125,24 @@ def test_few_that_fly_about_do_not_shorten_the_list_of_those_at_rest():
     assert np.abs(bed.velocity[-1, 0] * bed.step * scene.time_step) > bed.room[:-1].max()
 
 
-def test_parts_give_their_forces_to_the_spheres_of_the_others():
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_parts_give_their_forces_to_the_spheres_of_the_others(friction):
     side, n = 400e-6, 10
-    rng = np.random.default_rng(1)
-    grid = (np.array([(x, y, z) for z in range(n) for y in range(n) for x in range(n)]) + 0.5) * side / n
-    scene = scene_of(CrystalSizeDistribution.from_classes([40e-6], [1.0]), n**3, friction=0.2, cohesion=2e4)
-    velocity = rng.uniform(-0.01, 0.01, grid.shape)
-    one, two = (
-        Bed(grid, velocity, np.full(n**3, 20.05e-6), side, scene, gravity=0.0, threads=threads) for threads in (1, 2)
-    )
+    coarse = (np.array([(x, y, z) for z in range(n) for y in range(n) for x in range(n)]) + 0.5) * side / n
+    # fine ones between four coarse ones: they list those below them, too
+    place = np.vstack([coarse, coarse + np.array([0.5, 0.5, 0.0]) * side / n])
+    radius = np.repeat([20.05e-6, 8.28e-6], n**3)
+    velocity = np.random.default_rng(1).uniform(-0.01, 0.01, place.shape)
+    scene = scene_of(mixture([16e-6, 40e-6], [0.1, 0.9]), radius.size, friction=friction, cohesion=2e4)
+    one, two = (Bed(place, velocity, radius, side, scene, gravity=0.0, threads=threads) for threads in (1, 2))
     for bed in (one, two):
-        bed.spin[:] = np.random.default_rng(2).uniform(-300.0, 300.0, grid.shape)
+        bed.spin[:] = np.random.default_rng(2).uniform(-300.0, 300.0, place.shape)
         bed.advance(25)
+    pairs, middle = two.pairs, two.pairs.bounds[1]
+    upper = slice(int(pairs.first[middle]), int(pairs.near_end[1]))
+    assert (pairs.near_neighbour[upper] & pair_kernels.INDEX_MASK < middle).any()
     assert not two.force[1:].any() and not two.torque[1:].any()
-    for name in ("spheres", "spin", "force", "torque"):
+    for name in ("spheres", "force", *(("spin", "torque") if friction else ())):
         first, other = (
             (getattr(bed, name)[0] if name in ("force", "torque") else getattr(bed, name))[np.argsort(bed.identity)]
             for bed in (one, two)
