@@ -261,7 +261,9 @@ class Bed:
         n = self.count
         if n == 0:
             return np.empty(0, dtype=np.int64)
-        self.position[:n, :2] %= self.length
+        sideways = self.position[:n, :2]
+        away = (sideways < 0.0) | (sideways >= self.length)
+        sideways[away] %= self.length
         if not float(self.position[:n, 2].max()) < self.ceiling:
             raise EngineError(
                 "the bed exploded: spheres fly far above where they started; use a shorter time step",
@@ -270,7 +272,7 @@ class Bed:
         # spheres of any size together: by small cubes
         order = self._by_cell(self.spheres[:n], np.zeros(n, dtype=np.int64), self.largest[:1])[0]
         for array in self._arrays():
-            array[:n] = array[:n][order]
+            array[:n] = array[:n].take(order, axis=0)
         return order
 
     def _by_cell(
