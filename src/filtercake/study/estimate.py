@@ -47,7 +47,7 @@ PRESSED_STEPS: Final = {
 
 SPHERES: Final = 8000
 """Number of spheres that the engines' times per sphere and step are for."""
-GROWTH: Final = 0.1
+GROWTH: Final = 0.04
 """Exponent of the time per sphere in the number of spheres: less of a large bed is surface, and it needs more steps."""
 START_SECONDS: Final = 1.5
 """Seconds of a job before and after its packings: Python, compiled kernels from their cache, records."""

@@ -34,7 +34,7 @@ class Embedded(Engine):
 
     name = "embedded"
     label = "embedded engine"
-    sphere_step = (9.5e-9, 22e-9)
+    sphere_step = (9.2e-9, 20.5e-9)
     compiles = True
 
     @classmethod

@@ -58,7 +58,7 @@ class Liggghts(Engine):
     name = "liggghts"
     label = "LIGGGHTS"
     template = "packing.in.j2"
-    sphere_step = (110e-9, 125e-9)
+    sphere_step = (105e-9, 118e-9)
     wide_factor = 1.8  # a wide distribution fills its one neighbour grid with pairs that never touch
     least_restitution = 0.05
     evidence = ("packing.in", "cloud.data", "screen.log")
